@@ -32,7 +32,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 import quadfringe as qf
-from quadfringe.calibration.response import estimate_from_files
 from quadfringe.errors import DecodeError, DecodeWarning
 from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import scoring
@@ -82,12 +81,6 @@ def shots(data: Path, name: str, offsets: range) -> Iterator[tuple[str, scoring.
 def turned_shots(data: Path, name: str, offsets: range) -> Iterator[tuple[str, scoring.Scene]]:
     for offset in offsets:
         yield f"{name}, turned, step {offset}", turned(stepped(data, name, offset), offset)
-
-
-def response_of(data: Path, name: str, choice: str) -> Any:
-    if choice != "known":
-        return choice
-    return estimate_from_files(scenes.step_files(data, name), scenes.STEPS).calibration
 
 
 def judged(label: str, scene: scoring.Scene, **how: Any) -> Judged:
@@ -218,7 +211,9 @@ def options_of() -> argparse.Namespace:
 
 def measured(options: argparse.Namespace, name: str) -> tuple[dict[str, float], list[Judged]]:
     """Give the figures of a capture and its shots, without those that are turned."""
-    response, offsets = response_of(options.data, name, options.response), CHOSEN[options.offsets]
+    known = options.response == "known"
+    response = scenes.response_of(options.data, name) if known else options.response
+    offsets = CHOSEN[options.offsets]
 
     def all_of(made: Iterator[tuple[str, scoring.Scene]], words: str = "", **how: Any) -> list[Judged]:
         chosen = (

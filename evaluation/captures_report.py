@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import quadfringe as qf
-from quadfringe.calibration.response import estimate_from_files
 from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import scoring
 from quadfringe.files import figures_text
@@ -36,7 +35,7 @@ def capture_scores(data: Path, settings: dict[str, Any]) -> dict[str, scoring.Sc
     scores = {}
     for name in scenes.CAPTURES:
         scene = scenes.capture(data, name)
-        response = estimate_from_files(scenes.step_files(data, name), scenes.STEPS).calibration
+        response = scenes.response_of(data, name)
         for label, known in (("as_linear", "linear"), ("auto_response", "auto"), ("with_response", response)):
             shape = scenes.shape_of(scene, response=known, **settings)
             scores[f"{name}_{label}"] = scoring.score(scene, shape.phase_rad)

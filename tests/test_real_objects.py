@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from support.bars import hold
 
 import quadfringe as qf
-from quadfringe.calibration.response import estimate_from_files
 from quadfringe.errors import DecodeError, DecodeWarning
 from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import scoring
@@ -98,7 +97,7 @@ def test_a_coloured_object_with_exchanged_channels_is_refused(coloured: scoring.
 @pytest.mark.filterwarnings("ignore:.*darker than the black:quadfringe.DecodeWarning")
 @pytest.mark.parametrize(("name", "variant", "offset"), WORST)
 def test_variants_of_captures_are_decoded(data_dir: Path, name: str, variant: str, offset: int) -> None:
-    response = estimate_from_files(scenes.step_files(data_dir, name), scenes.STEPS).calibration
+    response = scenes.response_of(data_dir, name)
     scene = VARIANTS[variant](stepped(data_dir, name, offset), offset)
     score = scoring.score(scene, scenes.shape_of(scene, response=response).phase_rad)
     hold("variants.right_percent", score.right_percent)
@@ -110,7 +109,7 @@ def test_variants_of_captures_are_decoded(data_dir: Path, name: str, variant: st
 def test_a_capture_that_is_turned_by_90_degrees_is_decoded_or_refused_as_such(
     data_dir: Path, name: str, offset: int
 ) -> None:
-    response = estimate_from_files(scenes.step_files(data_dir, name), scenes.STEPS).calibration
+    response = scenes.response_of(data_dir, name)
     scene = turned(stepped(data_dir, name, offset), offset)
     with pytest.warns(DecodeWarning, match="turned by 90 degrees"):
         score = scoring.score(scene, scenes.shape_of(scene, response=response).phase_rad)
@@ -121,7 +120,7 @@ def test_a_capture_that_is_turned_by_90_degrees_is_decoded_or_refused_as_such(
 
 
 def test_inclined_fringes_are_not_taken_for_turned_ones(data_dir: Path) -> None:
-    response = estimate_from_files(scenes.step_files(data_dir, "plate"), scenes.STEPS).calibration
+    response = scenes.response_of(data_dir, "plate")
     scene = VARIANTS["inclined"](stepped(data_dir, "plate", 4), 4)
     scenes.shape_of(scene, response=response, method="published")
 

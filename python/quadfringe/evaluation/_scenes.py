@@ -15,6 +15,7 @@ from quadfringe.evaluation.scoring import Image, Scene
 if TYPE_CHECKING:
     from quadfringe import Calibration, Plan, Shape, Shot, SystemConfig
     from quadfringe.config import ResponseChoice
+    from quadfringe.data import ResponseCalibration
 
 ROOT = Path(__file__).resolve().parents[3]  # the checkout
 CAPTURES = ("plate", "bottle")
@@ -49,6 +50,13 @@ def step_files(data: Path, name: str, frequency: int = 0) -> list[Path]:
     """List the 12 images of one frequency of a capture's N-step stack, in step order."""
     files = sorted((data / name / "raw").glob("*h.bmp"))
     return files[STEPS * frequency : STEPS * (frequency + 1)]
+
+
+def response_of(data: Path, name: str) -> ResponseCalibration:
+    """Estimate the response of a capture from its images of the first frequency."""
+    from quadfringe.calibration.response import estimate_from_files
+
+    return estimate_from_files(step_files(data, name), STEPS).calibration
 
 
 def noisy_8bit(image: Image, sigma: float, seed: int) -> NDArray[np.uint8]:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from quadfringe.config import Fringes, SystemConfig
+from quadfringe.config import Fringes, ResponseChoice, SystemConfig
 from quadfringe.data import Shot
 from quadfringe.decoding import Decoder, Plan
 from quadfringe.evaluation import _scenes as scenes
@@ -98,9 +98,9 @@ def of_pair() -> Given:
     return Given(taken.shot, bench.decoder(taken.shot).plan, taken.phase_rad, taken.counted)
 
 
-def of_scene(scene: scoring.Scene) -> Given:
+def of_scene(scene: scoring.Scene, response: ResponseChoice = "linear") -> Given:
     """Take an object on black, or a capture."""
-    shot, plan = scenes.plan_of(scene, response="linear")
+    shot, plan = scenes.plan_of(scene, response=response)
     return Given(shot, plan, scene.phase_rad, scene.scored)
 
 
@@ -116,7 +116,8 @@ def shots() -> Iterator[tuple[str, Given]]:
     yield "three colours", of_world("face", THREE)
     yield "two numbers", of_world("face", TWO)
     for name in scenes.CAPTURES:
-        yield name, of_scene(stepped(scenes.data_folder(), name, SEED))
+        data = scenes.data_folder()
+        yield name, of_scene(stepped(data, name, SEED), scenes.response_of(data, name))
 
 
 def figures_of(given: Iterable[tuple[str, Given]]) -> Figures:
