@@ -11,7 +11,7 @@ one is missed.
 Shots that are turned by 90 degrees are counted apart: the joint method decodes them, the published one must refuse them
 with a message that names the turn.
 Of right orders the summary gives the RMS phase error of a shot, its mean and its worst, and the mean share of phase
-errors within one and three stated standard deviations.
+errors within one and three standard deviations, of the stated uncertainty and of the noise of the truth together.
 With --rings a table tells how far from the outline of an object, or from a jump of the true phase, its pixels are lost.
 The picture shows the ten shots with the fewest right pixels of the object, then the ten with the fewest right ones of
 those returned: green is right, red is wrong, blue is no data on the object; grey is not scored.
@@ -102,9 +102,10 @@ def inside_of(scene: scoring.Scene, phase_rad: scoring.Map, sd_rad: scoring.Map 
     """Give the share of phase errors within each of `DEVIATIONS`, in %, of right orders on the object."""
     error_rad = phase_rad - scene.phase_rad
     right = scene.scored & (np.abs(error_rad) < np.pi)
-    if sd_rad is None:
+    if sd_rad is None or scene.phase_sd_rad is None:
         return np.full(len(DEVIATIONS), np.nan)
-    return np.array(scoring.within_percent(error_rad[right], sd_rad[right], DEVIATIONS))
+    stated_rad = np.hypot(sd_rad, scene.phase_sd_rad)
+    return np.array(scoring.within_percent(error_rad[right], stated_rad[right], DEVIATIONS))
 
 
 def rings_of(scene: scoring.Scene, phase_rad: scoring.Map) -> NDArray[np.float64]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.evaluation import _scenes as scenes
-from quadfringe.evaluation.scoring import Scene
+from quadfringe.evaluation.scoring import Map, Scene
 
 __all__ = ["OFFSETS", "VARIANTS", "stepped", "turned"]
 
@@ -29,6 +30,12 @@ SATURATION_E, DARK_NOISE_E = 10_000, 10
 # of a camera with gain. Less noise is rounded to black.
 BLACK_NOISE = 0.004
 ROTATION_DEG = 35.0
+# Range of the truth among 3 x 3 pixels up to which it is interpolated, rad, and the share of its standard
+# deviation that is left then: the mean of the squares of two linear weights, along both directions.
+SMOOTH_RAD = np.pi / 2
+INTERPOLATED = 2 / 3
+HARMONICS = 3  # of the fringes that the response makes
+SD_WINDOW_PX = 5  # side of the window in which the noise of the images is averaged
 OFFSETS = range(scenes.STEPS)
 SEEN_STEPS = 9 * scenes.STEPS  # shifts beyond leave the columns of the projector
 Variant = Callable[[Scene, int], Scene]
@@ -50,7 +57,21 @@ def stepped(data: Path, name: str, offset: int, other: int = 0) -> Scene:
     steps |= {key: (f, round(step)) for key, f, step in zip(("green", "ir"), (1, 2), _steps(shift), strict=True)}
     images = {key: _image(data, name, *step) for key, step in steps.items()}
     changed: dict[str, Any] = images
-    return replace(scene, **changed, phase_rad=scene.phase_rad + 2 * np.pi * shift / scenes.STEPS)
+    phase_rad = scene.phase_rad + 2 * np.pi * shift / scenes.STEPS
+    return replace(scene, **changed, phase_rad=phase_rad, phase_sd_rad=_truth_sd_rad(data, name))
+
+
+@cache
+def _truth_sd_rad(data: Path, name: str) -> Map:
+    """Estimate the noise of the true phase from what a sine and its harmonics leave of the 12 steps."""
+    steps = np.stack([_image(data, name, 0, step) for step in range(scenes.STEPS)]).astype(np.float64)
+    terms = np.fft.rfft(steps, axis=0)
+    modulation = 2 * np.abs(terms[1]) / scenes.STEPS
+    freedom = scenes.STEPS - 1 - 2 * HARMONICS
+    terms[: HARMONICS + 1] = 0
+    squares = np.sum(np.fft.irfft(terms, scenes.STEPS, axis=0) ** 2, axis=0) / freedom
+    noise = np.sqrt(cv2.blur(squares, (SD_WINDOW_PX, SD_WINDOW_PX)))
+    return np.asarray(np.sqrt(2 / scenes.STEPS) * noise / np.maximum(modulation, 1), np.float32)
 
 
 def _steps(shift: int) -> tuple[float, float]:
@@ -75,6 +96,7 @@ def _changed(scene: Scene, image: Callable[[Any], Any], truth: Callable[[Any], A
         scene,
         **changed,
         phase_rad=truth(scene.phase_rad),
+        phase_sd_rad=None if scene.phase_sd_rad is None else truth(scene.phase_sd_rad),
         scored=truth(scene.scored.astype(np.uint8)).astype(bool),
     )
 
@@ -113,7 +135,7 @@ def _binned(scene: Scene, _offset: int) -> Scene:
         return image.reshape(rows // 2, 2, columns // 2, 2).mean(axis=(1, 3))
 
     binned = _changed(scene, lambda image: np.round(means(image)).astype(np.uint8), means)
-    return replace(binned, scored=means(scene.scored.astype(float)) == 1)
+    return replace(_averaged(binned, 0.5), scored=means(scene.scored.astype(float)) == 1)
 
 
 def _darkened(scene: Scene, offset: int) -> Scene:
@@ -132,10 +154,25 @@ def _inclined(scene: Scene, _offset: int) -> Scene:
     rows, columns = scene.red.shape
     turn = cv2.getRotationMatrix2D((columns / 2, rows / 2), ROTATION_DEG, 1.0)
 
-    def rotated(how: int) -> Callable[[Any], Any]:
-        return lambda image: cv2.warpAffine(image, turn, (columns, rows), flags=how)
+    def rotated(image: Any, how: int = cv2.INTER_CUBIC, border: int = cv2.BORDER_CONSTANT) -> Any:
+        return cv2.warpAffine(image, turn, (columns, rows), flags=how, borderMode=border)
 
-    return _changed(scene, rotated(cv2.INTER_CUBIC), rotated(cv2.INTER_NEAREST))
+    def truth(values: Any) -> Any:
+        nearest = rotated(values, cv2.INTER_NEAREST)
+        if values.dtype == np.uint8:  # the mask
+            return nearest
+        window = np.ones((3, 3), np.uint8)
+        ranges = rotated(cv2.dilate(values, window) - cv2.erode(values, window), cv2.INTER_NEAREST)
+        between = rotated(values, cv2.INTER_LINEAR, cv2.BORDER_REPLICATE)
+        return np.where(ranges < SMOOTH_RAD, between, nearest)
+
+    return _averaged(_changed(scene, rotated, truth), INTERPOLATED)
+
+
+def _averaged(scene: Scene, left: float) -> Scene:
+    """Give the share of the noise of the truth that is left when it is averaged."""
+    sd_rad = scene.phase_sd_rad
+    return scene if sd_rad is None else replace(scene, phase_sd_rad=left * sd_rad)
 
 
 def turned(scene: Scene, offset: int) -> Scene:

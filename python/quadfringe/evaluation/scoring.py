@@ -49,6 +49,7 @@ class Scene:
     scored: Mask  # pixels that count
     depth_mm: Map | None = None
     shadow: Mask | None = None
+    phase_sd_rad: Map | None = None  # standard deviation of the truth by noise, where it was measured
 
     @property
     def channels(self) -> dict[str, Image]:
