@@ -10,6 +10,8 @@ report odd ones. Of all shots with the known response the figures are held again
 one is missed.
 Shots that are turned by 90 degrees are counted apart: the joint method decodes them, the published one must refuse them
 with a message that names the turn.
+At outlines and in dim light the truth is in doubt, because its three frequencies disagree there. The figures of sure
+pixels leave such pixels out.
 Of right orders the summary gives the RMS phase error of a shot, its mean and its worst, and the mean share of phase
 errors within one and three standard deviations, of the stated uncertainty and of the noise of the truth together.
 With --rings a table tells how far from the outline of an object, or from a jump of the true phase, its pixels are lost.
@@ -65,6 +67,7 @@ class Judged:
     refused: str  # the message of a refusal
     reason: str  # its cause in a few words
     score: scoring.Score
+    sure: scoring.Score  # of the pixels whose truth is sure
     picture: NDArray[np.uint8]
     rings: NDArray[np.float64]  # of each ring, % of the object and % of it without the right order
     inside: NDArray[np.float64]  # of right orders, % within each of `DEVIATIONS`; not a number without any
@@ -95,7 +98,8 @@ def judged(label: str, scene: scoring.Scene, **how: Any) -> Judged:
     score = scoring.score(scene, phase_rad)
     print(f"{label:42}{score.right_percent:9.2f}{score.right_of_returned_percent:15.3f}  {refused}", flush=True)
     picture, rings = drawn(label, scene, phase_rad), rings_of(scene, phase_rad)
-    return Judged(label, refused, reason, score, picture, rings, inside_of(scene, phase_rad, sd_rad))
+    sure = scoring.score(scene, phase_rad, mask=scene.sure)
+    return Judged(label, refused, reason, score, sure, picture, rings, inside_of(scene, phase_rad, sd_rad))
 
 
 def inside_of(scene: scoring.Scene, phase_rad: scoring.Map, sd_rad: scoring.Map | None) -> NDArray[np.float64]:
@@ -154,6 +158,11 @@ def summary(name: str, found: list[Judged]) -> dict[str, float]:
         "right_worst_percent": min(right),
         "right_of_returned_mean_percent": float(np.mean(returned)) if returned else np.nan,
         "right_of_returned_worst_percent": min(returned, default=np.nan),
+    }
+    sure = [one.sure.right_of_returned_percent for one in found if one.sure.returned_percent > 0]
+    figures |= {
+        "sure_right_mean_percent": float(np.mean([one.sure.right_percent for one in found])),
+        "sure_right_of_returned_worst_percent": min(sure, default=np.nan),
     }
     error_rad = [one.score.right_phase_rms_rad for one in found if one.score.returned_percent > 0]
     if error_rad:

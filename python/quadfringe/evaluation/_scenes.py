@@ -30,7 +30,7 @@ def data_folder() -> Path:
 
 
 def capture(data: Path, name: str) -> Scene:
-    """Read a real single shot; its object pixels are scored."""
+    """Read a real single shot; its object pixels are scored, those are sure in which the three frequencies agree."""
     with np.load(data / name / "single_shot.npz") as stored:
         a, b, c = (float(n) for n in stored["fringe_numbers"])
         return Scene(
@@ -43,6 +43,7 @@ def capture(data: Path, name: str) -> Scene:
             projector_width=int(stored["projector_width"]),
             phase_rad=stored["phase_abs"],
             scored=stored["object_mask"] & stored["mask"],
+            sure=stored["object_mask"] & stored["mask_strict"],
         )
 
 

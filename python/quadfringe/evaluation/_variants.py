@@ -98,6 +98,7 @@ def _changed(scene: Scene, image: Callable[[Any], Any], truth: Callable[[Any], A
         phase_rad=truth(scene.phase_rad),
         phase_sd_rad=None if scene.phase_sd_rad is None else truth(scene.phase_sd_rad),
         scored=truth(scene.scored.astype(np.uint8)).astype(bool),
+        sure=None if scene.sure is None else truth(scene.sure.astype(np.uint8)).astype(bool),
     )
 
 
@@ -135,7 +136,12 @@ def _binned(scene: Scene, _offset: int) -> Scene:
         return image.reshape(rows // 2, 2, columns // 2, 2).mean(axis=(1, 3))
 
     binned = _changed(scene, lambda image: np.round(means(image)).astype(np.uint8), means)
-    return replace(_averaged(binned, 0.5), scored=means(scene.scored.astype(float)) == 1)
+
+    def whole(mask: Any) -> Any:
+        return means(mask.astype(float)) == 1
+
+    sure = None if scene.sure is None else whole(scene.sure)
+    return replace(_averaged(binned, 0.5), scored=whole(scene.scored), sure=sure)
 
 
 def _darkened(scene: Scene, offset: int) -> Scene:

@@ -50,6 +50,7 @@ class Scene:
     depth_mm: Map | None = None
     shadow: Mask | None = None
     phase_sd_rad: Map | None = None  # standard deviation of the truth by noise, where it was measured
+    sure: Mask | None = None  # scored pixels whose truth is beyond doubt; None: all of them
 
     @property
     def channels(self) -> dict[str, Image]:
