@@ -27,7 +27,7 @@ def test_the_truth_of_an_inclined_shot_lies_between_pixels() -> None:
     from_column = turn[0, 0] * columns + turn[0, 1] * rows + turn[0, 2]
     inner = cv2.erode(inclined.scored.astype(np.uint8), np.ones((5, 5))) > 0
     # The nearest pixel lies up to 0.7 px away, 0.2 rad; OpenCV rounds places to 1/32 px.
-    assert np.abs(inclined.phase_rad - 0.3 * from_column)[inner].max() < 0.01
+    np.testing.assert_allclose(inclined.phase_rad[inner], 0.3 * from_column[inner], atol=0.01)
     assert inclined.phase_sd_rad is not None
     np.testing.assert_allclose(inclined.phase_sd_rad[inner], 0.01 * 2 / 3)
 
@@ -35,7 +35,7 @@ def test_the_truth_of_an_inclined_shot_lies_between_pixels() -> None:
 def test_the_truth_of_an_inclined_shot_is_not_mixed_at_a_step() -> None:
     smooth, step = (VARIANTS["inclined"](ramp(jump_rad), 0) for jump_rad in (0.0, 9.0))
     change_rad = (step.phase_rad - smooth.phase_rad)[step.scored]
-    assert np.minimum(np.abs(change_rad), np.abs(change_rad - 9)).max() < 0.3
+    np.testing.assert_allclose(np.minimum(np.abs(change_rad), np.abs(change_rad - 9)), 0, atol=0.3)
 
 
 def test_a_binned_truth_has_half_the_noise() -> None:
@@ -44,8 +44,8 @@ def test_a_binned_truth_has_half_the_noise() -> None:
     np.testing.assert_allclose(binned.phase_sd_rad, 0.005)
 
 
-def test_the_truth_of_captures_has_some_hundredths_of_a_radian_of_noise(data_dir: Path) -> None:
+def test_the_truth_of_captures_has_a_hundredth_of_a_radian_of_noise(data_dir: Path) -> None:
     for name in scenes.CAPTURES:
         scene = stepped(data_dir, name, 0)
         assert scene.phase_sd_rad is not None
-        assert 0.005 < np.median(scene.phase_sd_rad[scene.scored]) < 0.02
+        np.testing.assert_allclose(np.median(scene.phase_sd_rad[scene.scored]), 0.012, rtol=0.2)

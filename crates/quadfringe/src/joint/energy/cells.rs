@@ -22,11 +22,8 @@ pub(super) struct Cells {
     light: [Vec<f32>; 4],
     /// After the fit the contrast times `inside`; before it, the first is 1 for torn cells (`Surfaces::More`).
     contrast: [Vec<f32>; 4],
-    /// Mean phase at the start, rad.
+    /// Mean phase at the start, rad; after the fit the correction times `inside`.
     pub(super) phase: Vec<f32>,
-    /// After the fit the correction and the bending times `inside`, as in `CellFit`.
-    pub(super) correction: Vec<f32>,
-    pub(super) bend: Vec<f32>,
     /// 1 for cells that can be used in the fit; after it the variance times `inside`.
     usable: Vec<f32>,
     /// 1 for cells whose pixels are all lit and lie on one surface; after the fit for those that it reaches.
@@ -42,8 +39,6 @@ pub(super) struct CellFit {
     pub correction: f32,
     /// Variance of the phase, rad^2.
     pub variance: f32,
-    /// Variance of its second differences (J26), rad^2.
-    pub bend: f32,
     /// Light without fringes, linear.
     pub albedo: [f32; 4],
     pub contrast: [f32; 4],
@@ -54,7 +49,6 @@ impl CellFit {
         Self {
             correction: self.correction / sum,
             variance: self.variance / sum,
-            bend: self.bend / sum,
             albedo: self.albedo.map(|albedo| albedo / sum),
             contrast: self.contrast.map(|contrast| contrast / sum),
         }
@@ -180,16 +174,16 @@ impl Cells {
         any
     }
 
-    /// Takes over what the fit has found: correction, bending, variance, albedo and contrast, each times `inside`.
+    /// Replaces phase, usability and light by correction, variance, albedo and contrast, each times `inside`.
     pub fn replace(&mut self, found: impl Fn(usize, usize) -> Option<CellFit> + Sync) {
-        let Self { light, contrast, correction, bend, usable, inside, stride, width, .. } = self;
-        for plane in contrast.iter_mut().chain([&mut *correction, &mut *bend]) {
+        let Self { light, contrast, phase, usable, inside, stride, width, .. } = self;
+        for plane in contrast.iter_mut() {
             plane.resize(inside.len(), 0.0);
         }
-        let mut planes = [correction, bend, usable].into_iter().chain(light).chain(contrast).chain([inside]);
-        let mut planes: [_; 12] =
-            std::array::from_fn(|_| planes.next().expect("twelve planes").chunks_mut(*stride));
-        let rows: Vec<[&mut [f32]; 12]> = (0..self.height)
+        let mut planes = [phase, usable].into_iter().chain(light).chain(contrast).chain([inside]);
+        let mut planes: [_; 11] =
+            std::array::from_fn(|_| planes.next().expect("eleven planes").chunks_mut(*stride));
+        let rows: Vec<[&mut [f32]; 11]> = (0..self.height)
             .map(|_| planes.each_mut().map(|rows| rows.next().expect("as many rows as cells are high")))
             .collect();
         rows.into_par_iter().enumerate().for_each(|(y, mut rows)| {
@@ -199,8 +193,8 @@ impl Cells {
             for x in 0..*width {
                 let fit = found(y, x).filter(|_| inside[x] > 0.0);
                 inside[x] = f32::from(u8::from(fit.is_some()));
-                let CellFit { correction, bend, variance, albedo, contrast } = fit.unwrap_or_default();
-                let fitted = [correction, bend, variance].into_iter().chain(albedo).chain(contrast);
+                let CellFit { correction, variance, albedo, contrast } = fit.unwrap_or_default();
+                let fitted = [correction, variance].into_iter().chain(albedo).chain(contrast);
                 values.iter_mut().zip(fitted).for_each(|(row, value)| row[x] = value);
             }
         });
@@ -213,7 +207,7 @@ impl Cells {
         let planes = phase.par_chunks_mut(stride).zip(modulation.par_chunks_mut(stride));
         let rows = planes.zip(reasons.par_chunks_mut(stride)).enumerate();
         rows.for_each_init(Rows::default, |rows, (y, ((phase, modulation), reasons))| {
-            self.interpolate(&self.correction, scene, y, rows);
+            self.interpolate(&self.phase, scene, y, rows);
             let found = rows.sum.iter().zip(&rows.weight);
             let pixels = phase.iter_mut().zip(modulation).zip(reasons);
             for (((phase, modulation), reason), (sum, weight)) in pixels.zip(found) {
@@ -230,7 +224,7 @@ impl Cells {
     /// Mean square of the correction, rad^2.
     pub fn correction(&self) -> f32 {
         let sum = |map: &[f32]| map.iter().map(|value| f64::from(value * value)).sum::<f64>();
-        (sum(&self.correction) / sum(&self.inside).max(1.0)) as f32
+        (sum(&self.phase) / sum(&self.inside).max(1.0)) as f32
     }
 
     /// Variance along row `y` of the scene, 0 where there is no lit cell.

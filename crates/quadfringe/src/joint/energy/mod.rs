@@ -29,6 +29,7 @@ use super::scene::{Pixels, Scene};
 use crate::parallel::slots::Slots;
 use cells::{CellFit, Cells};
 use layout::Axis;
+use pixels::Surface;
 use plane::Plane;
 use rayon::prelude::*;
 use tile::{Found, Tile};
@@ -76,8 +77,9 @@ impl Energy {
             },
         );
         let tiles = &*tiles;
-        cells.replace(|y, x| blend(tiles, &rows, &columns, [y, x]));
-        cells.smooth_start(scene, &mut pixels.phase);
+        let shares = |y, x| shares(tiles, &rows, &columns, [y, x]);
+        cells.smooth_start(scene, |y, x| surface(shares(y, x)), &mut pixels.phase);
+        cells.replace(|y, x| blend(shares(y, x)));
         cells.correct(scene, pixels);
     }
 
@@ -109,22 +111,58 @@ fn cell_px(period_px: f64) -> usize {
     side
 }
 
-/// Blends the tiles at one cell; none outside the lit cells.
-fn blend(tiles: &[Found], rows: &Axis, columns: &Axis, [y, x]: [usize; 2]) -> Option<CellFit> {
-    let (mut sum, mut fit) = (0.0, CellFit::default());
-    for row in rows.around(y) {
-        for column in columns.around(x) {
+/// A tile at one of its cells.
+struct Share<'a> {
+    found: &'a Found,
+    at: [usize; 2],
+    weight: f32,
+}
+
+impl Share<'_> {
+    fn value(&self, plane: &Plane) -> f32 {
+        plane.row(self.at[0])[self.at[1]]
+    }
+}
+
+/// The tiles that have found something at a cell.
+fn shares<'a>(
+    tiles: &'a [Found],
+    rows: &'a Axis,
+    columns: &'a Axis,
+    [y, x]: [usize; 2],
+) -> impl Iterator<Item = Share<'a>> {
+    rows.around(y).flat_map(move |row| {
+        columns.around(x).map(move |column| {
             let found = &tiles[row.tile * columns.origins.len() + column.tile];
-            let value = |plane: &Plane| plane.row(row.inner)[column.inner];
-            let weight = row.weight * column.weight * value(&found.inside);
-            sum += weight;
-            fit.correction += weight * value(&found.correction);
-            fit.bend += weight * found.bend;
-            fit.variance += weight * value(&found.variance);
-            for c in 0..4 {
-                fit.albedo[c] += weight * value(&found.albedo[c]);
-                fit.contrast[c] += weight * found.channel_contrast[c] * value(&found.contrast);
-            }
+            let at = [row.inner, column.inner];
+            Share { found, at, weight: row.weight * column.weight * found.inside.row(at[0])[at[1]] }
+        })
+    })
+}
+
+/// Blends the surfaces of the tiles at one cell; none outside the lit cells.
+fn surface<'a>(shares: impl Iterator<Item = Share<'a>>) -> Option<Surface> {
+    let (mut sum, mut surface) = (0.0, Surface::default());
+    for share in shares {
+        let Share { found, weight, .. } = share;
+        sum += weight;
+        surface.correction += weight * share.value(&found.correction);
+        surface.bend += weight * found.bend;
+    }
+    (sum > 0.0).then(|| Surface { correction: surface.correction / sum, bend: surface.bend / sum })
+}
+
+/// Blends the tiles at one cell; none outside the lit cells.
+fn blend<'a>(shares: impl Iterator<Item = Share<'a>>) -> Option<CellFit> {
+    let (mut sum, mut fit) = (0.0, CellFit::default());
+    for share in shares {
+        let Share { found, weight, .. } = share;
+        sum += weight;
+        fit.correction += weight * share.value(&found.correction);
+        fit.variance += weight * share.value(&found.variance);
+        for c in 0..4 {
+            fit.albedo[c] += weight * share.value(&found.albedo[c]);
+            fit.contrast[c] += weight * found.channel_contrast[c] * share.value(&found.contrast);
         }
     }
     (sum > 0.0).then(|| fit.divided_by(sum))

@@ -7,11 +7,30 @@ use crate::joint::params::energy::CURVED_MAX;
 use crate::joint::scene::Scene;
 use rayon::prelude::*;
 
-/// Working lines, one value for each cell.
+/// What the fit has found for the surface at one cell.
+#[derive(Debug, Default)]
+pub(super) struct Surface {
+    /// Change of the phase, rad.
+    pub correction: f32,
+    /// Variance of the second differences of the phase (J26), rad^2.
+    pub bend: f32,
+}
+
+/// A row of cells.
+#[derive(Debug, Default)]
+struct Line {
+    /// Fitted phase, rad; not a number outside the cells of the fit.
+    fitted: Vec<f32>,
+    bend: Vec<f32>,
+}
+
+/// Working lines.
 #[derive(Debug, Default)]
 struct Work {
-    /// Fitted phases of the cells above, at and below; not a number outside the cells of the fit.
-    fitted: [Vec<f32>; 3],
+    /// The row of cells for which the lines are loaded.
+    row: Option<usize>,
+    /// The rows of cells above, at and below.
+    lines: [Line; 3],
     /// Whether the cells around lie on one surface.
     smooth: Vec<bool>,
     /// Phase of the surface of the start along a row of pixels, its mean over the columns of a cell.
@@ -19,19 +38,22 @@ struct Work {
 }
 
 impl Cells {
-    /// Replaces the phase of the start, in pixels among cells of one surface, by that of the surface through the cells. The cells have
-    /// their fit.
-    pub fn smooth_start(&self, scene: &Scene<'_>, phase: &mut [f32]) {
+    /// Replaces the phase of the start, in pixels among cells of one surface, by that of the surface through the cells. `fit` gives what
+    /// the fit has found for a cell.
+    pub fn smooth_start(
+        &self,
+        scene: &Scene<'_>,
+        fit: impl Fn(usize, usize) -> Option<Surface> + Sync,
+        phase: &mut [f32],
+    ) {
         let stride = scene.grid.stride;
         let bands = phase.par_chunks_mut(self.factor * stride).enumerate();
         bands.for_each_init(Work::default, |work, (row, phase)| {
             if row == 0 || row + 1 >= self.height {
                 return;
             }
-            for (k, line) in work.fitted.iter_mut().enumerate() {
-                self.load_fitted(row + k - 1, line);
-            }
-            work.find_smooth(self.row(&self.bend, row));
+            self.load_lines(row, &fit, work);
+            work.find_smooth();
             if !work.smooth.contains(&true) {
                 return;
             }
@@ -41,20 +63,27 @@ impl Cells {
         });
     }
 
-    /// One row of a map.
-    fn row<'a>(&self, map: &'a [f32], y: usize) -> &'a [f32] {
-        &map[y * self.stride..][..self.width]
+    /// Loads the lines around a row of cells. After the row before, one of them is new.
+    fn load_lines(&self, row: usize, fit: &impl Fn(usize, usize) -> Option<Surface>, work: &mut Work) {
+        let Work { row: before, lines, .. } = work;
+        let known = if before.replace(row) == Some(row - 1) { 2 } else { 0 };
+        lines.rotate_left(1);
+        for (k, Line { fitted, bend }) in lines.iter_mut().enumerate().skip(known) {
+            let y = row + k - 1;
+            fitted.clear();
+            bend.clear();
+            for x in 0..self.width {
+                let found = fit(y, x);
+                fitted.push(found.as_ref().map_or(f32::NAN, |fit| self.start(y, x) + fit.correction));
+                bend.push(found.map_or(0.0, |fit| fit.bend));
+            }
+        }
     }
 
-    /// Loads the fitted phases of a row of cells.
-    fn load_fitted(&self, y: usize, line: &mut Vec<f32>) {
-        let [phase, correction, inside] =
-            [&self.phase, &self.correction, &self.inside].map(|map| self.row(map, y));
-        let cells = phase.iter().zip(correction).zip(inside);
-        line.clear();
-        line.extend(
-            cells.map(|((phase, correction), &lit)| if lit > 0.0 { phase + correction } else { f32::NAN }),
-        );
+    /// Mean phase of a cell at the start, rad; not a number outside the lit cells.
+    fn start(&self, y: usize, x: usize) -> f32 {
+        let at = y * self.stride + x;
+        if self.inside[at] > 0.0 { self.phase[at] } else { f32::NAN }
     }
 
     /// Replaces the phase of pixels in row `i` of a row of cells by that of the parabolas along rows and columns that have the means of
@@ -63,8 +92,7 @@ impl Cells {
         let Work { smooth, means, .. } = work;
         let down = parabola(i, self.factor);
         means.clear();
-        let three = [row - 1, row, row + 1].map(|y| self.row(&self.phase, y));
-        means.extend((0..self.width).map(|x| mix(down, three.map(|line| line[x]))));
+        means.extend((0..self.width).map(|x| mix(down, [row - 1, row, row + 1].map(|y| self.start(y, x)))));
         for x in (0..self.width).filter(|&x| smooth[x]) {
             let three = [means[x - 1], means[x], means[x + 1]];
             for (i, phase) in phase[x * self.factor..][..self.factor].iter_mut().enumerate() {
@@ -76,18 +104,19 @@ impl Cells {
 
 impl Work {
     /// Finds the cells through which no second difference is larger than the bending of the tile explains, and whose neighbours have
-    /// a fit; `bend` is the variance of the second differences of their phases (J26), rad^2.
-    fn find_smooth(&mut self, bend: &[f32]) {
-        let Self { fitted: [above, here, below], smooth, .. } = self;
+    /// a fit.
+    fn find_smooth(&mut self) {
+        let Self { lines, smooth, .. } = self;
+        let [above, here, below] = lines.each_ref().map(|line| &line.fitted);
         let width = here.len();
         smooth.clear();
         smooth.extend((0..width).map(|x| {
-            let most = CURVED_MAX * CURVED_MAX * bend[x];
+            let most = CURVED_MAX * CURVED_MAX * lines[1].bend[x];
             // A comparison with no number is false.
             let gentle = |three: [f32; 3]| (three[0] - 2.0 * three[1] + three[2]).powi(2) <= most;
             let inner = x > 0 && x + 1 < width;
             inner
-                && [&*above, here, below].iter().all(|line| gentle([line[x - 1], line[x], line[x + 1]]))
+                && [above, here, below].iter().all(|line| gentle([line[x - 1], line[x], line[x + 1]]))
                 && (x - 1..=x + 1).all(|x| gentle([above[x], here[x], below[x]]))
         }));
     }
@@ -127,9 +156,12 @@ mod tests {
     #[test]
     fn a_step_or_a_missing_cell_ends_the_surface() {
         let smooth = |change: f32| {
-            let line = || (0..8).map(|x| 0.6 * x as f32 + if x > 4 { change } else { 0.0 }).collect();
-            let mut work = Work { fitted: [line(), line(), line()], ..Work::default() };
-            work.find_smooth(&[1e-4; 8]);
+            let line = || Line {
+                fitted: (0..8).map(|x| 0.6 * x as f32 + if x > 4 { change } else { 0.0 }).collect(),
+                bend: vec![1e-4; 8],
+            };
+            let mut work = Work { lines: [line(), line(), line()], ..Work::default() };
+            work.find_smooth();
             work.smooth
         };
         assert_eq!(smooth(0.0), [false, true, true, true, true, true, true, false]);
