@@ -54,6 +54,8 @@ HELD = (
     "right_mean_percent",
     "right_worst_percent",
     "right_of_returned_worst_percent",
+    "sure_right_mean_percent",
+    "sure_right_of_returned_worst_percent",
     "turned_joint_right_worst_percent",
     "turned_published_named_percent",
 )
