@@ -10,10 +10,10 @@ report odd ones. Of all shots with the known response the figures are held again
 one is missed.
 Shots that are turned by 90 degrees are counted apart: the joint method decodes them, the published one must refuse them
 with a message that names the turn.
-At outlines and in dim light the truth is in doubt, because its three frequencies disagree there. The figures of sure
-pixels leave such pixels out.
-Of right orders the summary gives the RMS phase error of a shot, its mean and its worst, and the mean share of phase
-errors within one and three standard deviations, of the stated uncertainty and of the noise of the truth together.
+The data mark pixels whose truth is in doubt, at outlines above all. The figures of sure pixels leave them out.
+Of right orders the summary gives the RMS phase error of a shot, its mean and its worst, the mean of the medians, and
+the mean share of phase errors within one and three standard deviations, of the stated uncertainty and of the noise of
+the truth together.
 With --rings a table tells how far from the outline of an object, or from a jump of the true phase, its pixels are lost.
 The picture shows the ten shots with the fewest right pixels of the object, then the ten with the fewest right ones of
 those returned: green is right, red is wrong, blue is no data on the object; grey is not scored.
@@ -62,6 +62,14 @@ HELD = (
 
 
 @dataclass(frozen=True)
+class Errors:
+    """Phase errors of right orders on the object; not a number without any."""
+
+    median_rad: float
+    inside_percent: list[float]  # within each of `DEVIATIONS`
+
+
+@dataclass(frozen=True)
 class Judged:
     """A decoded shot: its name, the reason of a refusal, the score, and its picture."""
 
@@ -72,7 +80,7 @@ class Judged:
     sure: scoring.Score  # of the pixels whose truth is sure
     picture: NDArray[np.uint8]
     rings: NDArray[np.float64]  # of each ring, % of the object and % of it without the right order
-    inside: NDArray[np.float64]  # of right orders, % within each of `DEVIATIONS`; not a number without any
+    errors: Errors
 
 
 def shots(data: Path, name: str, offsets: range) -> Iterator[tuple[str, scoring.Scene]]:
@@ -101,17 +109,18 @@ def judged(label: str, scene: scoring.Scene, **how: Any) -> Judged:
     print(f"{label:42}{score.right_percent:9.2f}{score.right_of_returned_percent:15.3f}  {refused}", flush=True)
     picture, rings = drawn(label, scene, phase_rad), rings_of(scene, phase_rad)
     sure = scoring.score(scene, phase_rad, mask=scene.sure)
-    return Judged(label, refused, reason, score, sure, picture, rings, inside_of(scene, phase_rad, sd_rad))
+    return Judged(label, refused, reason, score, sure, picture, rings, errors_of(scene, phase_rad, sd_rad))
 
 
-def inside_of(scene: scoring.Scene, phase_rad: scoring.Map, sd_rad: scoring.Map | None) -> NDArray[np.float64]:
-    """Give the share of phase errors within each of `DEVIATIONS`, in %, of right orders on the object."""
-    error_rad = phase_rad - scene.phase_rad
-    right = scene.scored & (np.abs(error_rad) < np.pi)
-    if sd_rad is None or scene.phase_sd_rad is None:
-        return np.full(len(DEVIATIONS), np.nan)
+def errors_of(scene: scoring.Scene, phase_rad: scoring.Map, sd_rad: scoring.Map | None) -> Errors:
+    """Hold the phase errors of right orders against the stated uncertainty and the noise of the truth together."""
+    error_rad = np.abs(phase_rad - scene.phase_rad)
+    right = scene.scored & (error_rad < np.pi)
+    if sd_rad is None or scene.phase_sd_rad is None or not right.any():
+        return Errors(np.nan, [np.nan] * len(DEVIATIONS))
     stated_rad = np.hypot(sd_rad, scene.phase_sd_rad)
-    return np.array(scoring.within_percent(error_rad[right], stated_rad[right], DEVIATIONS))
+    inside = scoring.within_percent(error_rad[right], stated_rad[right], DEVIATIONS)
+    return Errors(float(np.median(error_rad[right])), inside)
 
 
 def rings_of(scene: scoring.Scene, phase_rad: scoring.Map) -> NDArray[np.float64]:
@@ -169,7 +178,8 @@ def summary(name: str, found: list[Judged]) -> dict[str, float]:
     error_rad = [one.score.right_phase_rms_rad for one in found if one.score.returned_percent > 0]
     if error_rad:
         figures |= {"phase_rms_mean_rad": float(np.mean(error_rad)), "phase_rms_worst_rad": max(error_rad)}
-    inside = np.nanmean([one.inside for one in found], axis=0)
+        figures["phase_median_rad"] = float(np.nanmean([one.errors.median_rad for one in found]))
+    inside = np.nanmean([one.errors.inside_percent for one in found], axis=0)
     figures |= {f"inside_{limit}_sd_percent": float(share) for limit, share in zip(DEVIATIONS, inside, strict=True)}
     return told(name, figures)
 

@@ -16,7 +16,6 @@ from quadfringe.decoding.pair_numbers import infrared_along_rays, order_margin_r
 from quadfringe.evaluation.world.pairs import PAIRS, PairBench, PairFigures, judge_pair
 
 SEED = 2
-SEEDS = range(1, 9)
 SIDE_BY_SIDE = ("50 mm nearer", "50 mm farther", "50 mm above")
 
 
@@ -39,10 +38,10 @@ def test_a_deviated_pair_is_as_good_as_a_coaxial_one(depth_mm: float) -> None:
     hold("pair.joint_returned_percent", found.returned_percent)
 
 
-@pytest.mark.parametrize("depth_mm", [700.0, 800.0, 900.0])
-def test_a_deviated_pair_has_few_wrong_orders(depth_mm: float) -> None:
-    # Chance decides about a strip where the light of one projector ends, so one seed says little.
-    wrong = [figures("1 degree, 5 mm", depth_mm, seed).wrong_percent for seed in SEEDS]
+@pytest.mark.parametrize(("depth_mm", "seeds"), [(700.0, 8), (800.0, 8), (900.0, 24)])
+def test_a_deviated_pair_has_few_wrong_orders(depth_mm: float, seeds: int) -> None:
+    # Chance decides about a strip where the light of one projector ends, most of all at 900 mm: one seed says little.
+    wrong = [figures("1 degree, 5 mm", depth_mm, seed).wrong_percent for seed in range(1, seeds + 1)]
     hold("pair.joint_plane_wrong_order_percent", np.mean(wrong))
 
 

@@ -30,7 +30,7 @@ def data_folder() -> Path:
 
 
 def capture(data: Path, name: str) -> Scene:
-    """Read a real single shot; its object pixels are scored, those are sure in which the three frequencies agree."""
+    """Read a real single shot; its object pixels are scored, and those of the strict mask of the data are sure."""
     with np.load(data / name / "single_shot.npz") as stored:
         a, b, c = (float(n) for n in stored["fringe_numbers"])
         return Scene(

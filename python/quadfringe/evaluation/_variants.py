@@ -39,6 +39,7 @@ SD_WINDOW_PX = 5  # side of the window in which the noise of the images is avera
 OFFSETS = range(scenes.STEPS)
 SEEN_STEPS = 9 * scenes.STEPS  # shifts beyond leave the columns of the projector
 Variant = Callable[[Scene, int], Scene]
+Change = Callable[[Any], Any]  # of an image, of the truth, or of a mask
 
 
 def stepped(data: Path, name: str, offset: int, other: int = 0) -> Scene:
@@ -89,16 +90,25 @@ def _image(data: Path, name: str, frequency: int, step: int) -> NDArray[np.uint8
     return np.asarray(image, np.uint8)
 
 
-def _changed(scene: Scene, image: Callable[[Any], Any], truth: Callable[[Any], Any] | None = None) -> Scene:
+def _changed(
+    scene: Scene,
+    image: Change,
+    truth: Change | None = None,
+    mask: Change | None = None,
+    noise_left: float = 1.0,
+) -> Scene:
+    """Change images, truth and masks, by default alike; the share `noise_left` of the noise of the truth remains."""
     truth = truth or image
+    of_mask = mask or truth
     changed: dict[str, Any] = {name: np.ascontiguousarray(image(channel)) for name, channel in scene.channels.items()}
+    sd_rad, sure = scene.phase_sd_rad, scene.sure
     return replace(
         scene,
         **changed,
         phase_rad=truth(scene.phase_rad),
-        phase_sd_rad=None if scene.phase_sd_rad is None else truth(scene.phase_sd_rad),
-        scored=truth(scene.scored.astype(np.uint8)).astype(bool),
-        sure=None if scene.sure is None else truth(scene.sure.astype(np.uint8)).astype(bool),
+        phase_sd_rad=None if sd_rad is None else noise_left * truth(sd_rad),
+        scored=of_mask(scene.scored.astype(np.uint8)).astype(bool),
+        sure=None if sure is None else of_mask(sure.astype(np.uint8)).astype(bool),
     )
 
 
@@ -135,13 +145,10 @@ def _binned(scene: Scene, _offset: int) -> Scene:
         rows, columns = image.shape
         return image.reshape(rows // 2, 2, columns // 2, 2).mean(axis=(1, 3))
 
-    binned = _changed(scene, lambda image: np.round(means(image)).astype(np.uint8), means)
+    def levels(image: Any) -> Any:
+        return np.round(means(image)).astype(np.uint8)
 
-    def whole(mask: Any) -> Any:
-        return means(mask.astype(float)) == 1
-
-    sure = None if scene.sure is None else whole(scene.sure)
-    return replace(_averaged(binned, 0.5), scored=whole(scene.scored), sure=sure)
+    return _changed(scene, levels, means, lambda mask: means(mask) == 1, noise_left=0.5)
 
 
 def _darkened(scene: Scene, offset: int) -> Scene:
@@ -163,22 +170,16 @@ def _inclined(scene: Scene, _offset: int) -> Scene:
     def rotated(image: Any, how: int = cv2.INTER_CUBIC, border: int = cv2.BORDER_CONSTANT) -> Any:
         return cv2.warpAffine(image, turn, (columns, rows), flags=how, borderMode=border)
 
+    def nearest(values: Any) -> Any:
+        return rotated(values, cv2.INTER_NEAREST)
+
     def truth(values: Any) -> Any:
-        nearest = rotated(values, cv2.INTER_NEAREST)
-        if values.dtype == np.uint8:  # the mask
-            return nearest
         window = np.ones((3, 3), np.uint8)
-        ranges = rotated(cv2.dilate(values, window) - cv2.erode(values, window), cv2.INTER_NEAREST)
+        ranges = nearest(cv2.dilate(values, window) - cv2.erode(values, window))
         between = rotated(values, cv2.INTER_LINEAR, cv2.BORDER_REPLICATE)
-        return np.where(ranges < SMOOTH_RAD, between, nearest)
+        return np.where(ranges < SMOOTH_RAD, between, nearest(values))
 
-    return _averaged(_changed(scene, rotated, truth), INTERPOLATED)
-
-
-def _averaged(scene: Scene, left: float) -> Scene:
-    """Give the share of the noise of the truth that is left when it is averaged."""
-    sd_rad = scene.phase_sd_rad
-    return scene if sd_rad is None else replace(scene, phase_sd_rad=left * sd_rad)
+    return _changed(scene, rotated, truth, nearest, INTERPOLATED)
 
 
 def turned(scene: Scene, offset: int) -> Scene:

@@ -17,17 +17,17 @@ pub(super) struct Cells {
     pub width: usize,
     /// Pixels along a side of a cell.
     pub factor: usize,
-    pub(super) stride: usize,
+    stride: usize,
     /// Means of linear light; after the fit the albedo times `inside`.
     light: [Vec<f32>; 4],
     /// After the fit the contrast times `inside`; before it, the first is 1 for torn cells (`Surfaces::More`).
     contrast: [Vec<f32>; 4],
     /// Mean phase at the start, rad; after the fit the correction times `inside`.
-    pub(super) phase: Vec<f32>,
+    phase: Vec<f32>,
     /// 1 for cells that can be used in the fit; after it the variance times `inside`.
     usable: Vec<f32>,
     /// 1 for cells whose pixels are all lit and lie on one surface; after the fit for those that it reaches.
-    pub(super) inside: Vec<f32>,
+    inside: Vec<f32>,
     /// Of a calibrated pair, the tangent of the infrared phase at the mean phase: its value at a phase of 0, and its slope.
     infrared: [Vec<f32>; 2],
 }
@@ -119,6 +119,12 @@ impl Cells {
             }
         });
         self.draw_tangents(scene);
+    }
+
+    /// Mean phase of a cell at the start, rad; not a number outside the lit cells.
+    pub fn start(&self, y: usize, x: usize) -> f32 {
+        let at = y * self.stride + x;
+        if self.inside[at] > 0.0 { self.phase[at] } else { f32::NAN }
     }
 
     /// The tangents of the infrared phase of a pair at the mean phases.

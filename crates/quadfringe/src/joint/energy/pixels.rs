@@ -80,12 +80,6 @@ impl Cells {
         }
     }
 
-    /// Mean phase of a cell at the start, rad; not a number outside the lit cells.
-    fn start(&self, y: usize, x: usize) -> f32 {
-        let at = y * self.stride + x;
-        if self.inside[at] > 0.0 { self.phase[at] } else { f32::NAN }
-    }
-
     /// Replaces the phase of pixels in row `i` of a row of cells by that of the parabolas along rows and columns that have the means of
     /// the cells.
     fn take_surface(&self, [row, i]: [usize; 2], work: &mut Work, phase: &mut [f32]) {

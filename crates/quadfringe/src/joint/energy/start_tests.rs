@@ -56,17 +56,23 @@ fn first_error(Case { mut tile, truth }: Case) -> f32 {
     errors(&tile, &truth).rms
 }
 
+/// Checks that more starts leave a wrong minimum, with at most these errors.
+fn check_more_starts(made: fn() -> Case, most: &Errors) {
+    let first = first_error(made());
+    let Case { mut tile, truth } = made();
+    tile.minimise(NOISE, 1.0);
+    let last = errors(&tile, &truth);
+    let spread = vectors().map(|at| total(tile.spread.get(at))).sum::<f64>();
+    let better = last.rms < most.rms && last.rms < 0.5 * first && last.largest < most.largest;
+    assert!(first > 0.02 && better && spread > 0.0, "{first} {last:?} {spread}");
+}
+
 #[test]
-fn more_starts_leave_a_wrong_minimum() {
-    let print = (printed as fn() -> Case, Errors { rms: 0.005, largest: 0.05 });
-    let photograph = (photographed as fn() -> Case, Errors { rms: 0.015, largest: 0.1 });
-    for (made, most) in [print, photograph] {
-        let first = first_error(made());
-        let Case { mut tile, truth } = made();
-        tile.minimise(NOISE, 1.0);
-        let last = errors(&tile, &truth);
-        let spread = vectors().map(|at| total(tile.spread.get(at))).sum::<f64>();
-        let better = first > 0.02 && last.rms < most.rms && last.largest < most.largest;
-        assert!(better && spread > 0.0, "{first} {last:?} {spread}");
-    }
+fn more_starts_leave_a_wrong_minimum_in_a_print() {
+    check_more_starts(printed, &Errors { rms: 0.005, largest: 0.05 });
+}
+
+#[test]
+fn more_starts_remove_the_ripples_of_a_photograph() {
+    check_more_starts(photographed, &Errors { rms: 0.015, largest: 0.1 });
 }
