@@ -22,23 +22,21 @@ const THREE: [f32; 3] = [0.0, 1.0, 1.0];
 const FIVE: [f32; 3] = [1.0; 3];
 
 impl Tile {
-    /// Minimises once more from two other starts, if there is texture and the bridging surface lies elsewhere, and keeps the lowest
-    /// energy; `noise` as in `minimise`.
+    /// Minimises once more from two other starts, if there is texture, and keeps the lowest energy; `noise` as in `minimise`.
     pub(super) fn restart(&mut self, noise: f32) {
-        self.compared = false;
-        if !has_texture(self) {
+        self.compared = has_texture(self);
+        if !self.compared {
             return;
         }
         for (to, from) in self.first.planes_mut().into_iter().zip(self.unknown.planes()) {
             to.copy(from);
         }
-        self.compared = self.bridge();
-        if !self.compared {
-            return;
-        }
+        let differs = self.bridge();
         let Self { inside, torn, lit, product, .. } = self;
         continue_through(inside, torn, lit, [&mut product.phase, &mut product.contrast]);
-        self.start_again(noise);
+        if differs {
+            self.start_again(noise);
+        }
         let mixed = self.start_again(noise);
         let scales = self.scales;
         if mixed && excess(self, &scales, &[scales]) < 0.0 {
