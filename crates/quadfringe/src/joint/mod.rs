@@ -212,7 +212,8 @@ impl Joint {
         let quality = out.quality.as_slice_mut().expect("checked layout");
         let limits = validity::Limits { noise: self.coarse.noise, quality_min };
         let (orders, regions, ratios) = (&self.coarse.orders, &self.regions, self.ratios);
-        let evidence = validity::Evidence { map, pixel, orders, regions, ratios, limits };
+        let energy = &self.energy;
+        let evidence = validity::Evidence { map, pixel, orders, regions, energy, ratios, limits };
         self.validity.run(&scene, evidence, quality, reasons);
         self.saturation.invalidate(ratios, &mut self.validity.valid);
         if let Some(instants) = instants {

@@ -39,6 +39,8 @@ use tile::{Found, Tile};
 pub(super) struct Energy {
     cells: Cells,
     tiles: Vec<Found>,
+    /// Whether a cell and its neighbours lie on one surface.
+    smooth: Vec<bool>,
     slots: Slots<Tile>,
 }
 
@@ -60,7 +62,7 @@ impl Energy {
     pub fn minimise(&mut self, scene: &Scene<'_>, prior: Prior, pixels: &mut Pixels) {
         let factor = cell_px(scene.period_px);
         self.cells.average(scene, pixels.map(), factor);
-        let Self { cells, tiles, slots } = self;
+        let Self { cells, tiles, smooth, slots } = self;
         let [rows, columns] = [cells.height, cells.width].map(Axis::new);
         let across = columns.origins.len();
         tiles.resize_with(rows.origins.len() * across, Found::default);
@@ -78,7 +80,7 @@ impl Energy {
         );
         let tiles = &*tiles;
         let shares = |y, x| shares(tiles, &rows, &columns, [y, x]);
-        cells.smooth_start(scene, |y, x| surface(shares(y, x)), &mut pixels.phase);
+        cells.smooth_start(scene, |y, x| surface(shares(y, x)), &mut pixels.phase, smooth);
         cells.replace(|y, x| blend(shares(y, x)));
         cells.correct(scene, pixels);
     }
@@ -87,6 +89,11 @@ impl Energy {
     pub fn fringes<'a>(&self, scene: &Scene<'_>, y: usize, rows: &'a mut FringeRows) -> &'a FringeRows {
         self.cells.fringes(scene, y, rows);
         rows
+    }
+
+    /// Writes for each of the `width` pixels of row `y` whether the cells around it lie on one surface (J44).
+    pub fn on_one_surface(&self, y: usize, width: usize, out: &mut Vec<bool>) {
+        self.cells.write_smooth(&self.smooth, y, width, out);
     }
 
     /// Mean square of the correction of the last scene, rad^2.

@@ -38,17 +38,21 @@ struct Work {
 }
 
 impl Cells {
-    /// Replaces the phase of the start, in pixels among cells of one surface, by that of the surface through the cells. `fit` gives what
-    /// the fit has found for a cell.
+    /// Replaces the phase of the start, in pixels among cells of one surface, by that of the surface through the cells, and marks these
+    /// cells as `smooth`. `fit` gives what the fit has found for a cell.
     pub fn smooth_start(
         &self,
         scene: &Scene<'_>,
         fit: impl Fn(usize, usize) -> Option<Surface> + Sync,
         phase: &mut [f32],
+        smooth: &mut Vec<bool>,
     ) {
         let stride = scene.grid.stride;
-        let bands = phase.par_chunks_mut(self.factor * stride).enumerate();
-        bands.for_each_init(Work::default, |work, (row, phase)| {
+        smooth.clear();
+        smooth.resize(self.height * self.width, false);
+        let marks = smooth.par_chunks_mut(self.width.max(1));
+        let bands = phase.par_chunks_mut(self.factor * stride).zip(marks).enumerate();
+        bands.for_each_init(Work::default, |work, (row, (phase, marks))| {
             if row == 0 || row + 1 >= self.height {
                 return;
             }
@@ -57,10 +61,21 @@ impl Cells {
             if !work.smooth.contains(&true) {
                 return;
             }
+            marks.copy_from_slice(&work.smooth);
             for (i, phase) in phase.chunks_mut(stride).enumerate() {
                 self.take_surface([row, i], work, phase);
             }
         });
+    }
+
+    /// Writes for each of the `width` pixels of row `y` whether it lies among cells that are `smooth`.
+    pub fn write_smooth(&self, smooth: &[bool], y: usize, width: usize, out: &mut Vec<bool>) {
+        let row = y / self.factor * self.width;
+        out.clear();
+        if let Some(cells) = smooth.get(row..row + self.width) {
+            out.extend(cells.iter().flat_map(|mark| std::iter::repeat_n(*mark, self.factor)));
+        }
+        out.resize(width, false);
     }
 
     /// Loads the lines around a row of cells. After the row before, one of them is new.

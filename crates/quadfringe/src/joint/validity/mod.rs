@@ -1,5 +1,6 @@
 //! Step 8: validity. A hole is better than a wrong point: pixels become no data unless light, model and neighbourhood agree.
 
+mod check;
 mod close_steps;
 mod components;
 mod discontinuities;
@@ -7,18 +8,16 @@ mod regrow;
 mod support;
 
 use super::cells::{RowMaps, TaskWork};
-use super::neighbours::{around, sum_of_nine};
+use super::energy::Energy;
 use super::noise::NoiseByLight;
 use super::orders::Orders;
-use super::params::validity::{
-    COMPONENT_SIDE, MISFIT_MAX, NEIGHBOURS_MIN, PIXEL_MISFIT_MAX, PIXEL_RESIDUAL_NOISES_MAX,
-    RESIDUAL_NOISES_MAX, SEED_SIDE,
-};
+use super::params::validity::{COMPONENT_SIDE, NEIGHBOURS_MIN, SEED_SIDE};
 use super::regions::RegionOrders;
 use super::scene::{PhaseMap, Scene};
 use crate::Reason;
 use crate::decode::output::hole_unless;
 use crate::parallel::slots::Slots;
+use check::{CheckRow, VerdictRow, check_row};
 use close_steps::CloseSteps;
 use components::{Components, SizeLimits};
 use discontinuities::{Discontinuities, remove_narrow};
@@ -44,6 +43,7 @@ pub(super) struct Evidence<'a> {
     pub pixel: PixelFit<'a>,
     pub orders: &'a Orders,
     pub regions: &'a RegionOrders,
+    pub energy: &'a Energy,
     /// Fringe numbers divided by the first.
     pub ratios: [f32; 4],
     pub limits: Limits,
@@ -65,9 +65,9 @@ pub(super) struct Validity {
     pub valid: Vec<u8>,
     discontinuities: Discontinuities,
     close_steps: CloseSteps,
-    /// First not 0 at or next to an order jump, then 1 for pixels that pass the limits; then 1 for pixels of components that may grow, [`GROWN`] for those added.
+    /// First not 0 at or next to an order jump, then 1 for pixels that pass the limits; then 1 for pixels of components that may grow, and 1 or [`GROWN`] for those added.
     pub components: Vec<u8>,
-    /// 1 for pixels whose intensities agree with their order.
+    /// 1 for pixels whose light agrees with their phase, or whose phase that of the pixels around determines.
     consistent: Vec<u8>,
     noise: NoiseByLight,
     support: Support,
@@ -84,6 +84,7 @@ struct Rows {
     sums: Vec<f32>,
     order_quality: Vec<f32>,
     noise: Vec<f32>,
+    on_one_surface: Vec<bool>,
 }
 
 impl Validity {
@@ -106,6 +107,7 @@ impl Validity {
         let limits = SizeLimits { least: pixels(COMPONENT_SIDE), seed: pixels(SEED_SIDE) };
         self.labelling.remove_small(grid, map.phase, limits, &mut self.valid, &mut self.components);
         let candidates = regrow::Candidates {
+            light: scene.light,
             phase: map.phase,
             consistent: &self.consistent,
             at_jump: self.discontinuities.at_jump(),
@@ -133,7 +135,8 @@ impl Validity {
         rows.for_each_init(
             || slots.take(),
             |slot, (y, (quality, ((passed, consistent), reasons)))| {
-                let Rows { maps, spare, sums, order_quality, noise: variance } = &mut slot.rows;
+                let Rows { maps, spare, sums, order_quality, noise: variance, on_one_surface } =
+                    &mut slot.rows;
                 noise.row(scene.rows(y), variance);
                 let support = &support.row(grid, y, maps)[..grid.width];
                 let close = close_steps.row(grid, y);
@@ -144,7 +147,8 @@ impl Validity {
                     Surroundings { support, close, of_region: spare },
                     order_quality,
                 );
-                let known = CheckRow::of(scene, evidence, y, variance, order_quality);
+                evidence.energy.on_one_surface(y, grid.width, on_one_surface);
+                let known = CheckRow::of(scene, evidence, y, variance, order_quality, on_one_surface);
                 let out = VerdictRow { quality, passed, consistent, reasons };
                 check_row(&known, limits, [spare, sums], out);
             },
@@ -185,115 +189,10 @@ fn quality_of_orders(
     });
 }
 
-/// Input of the check of one row.
-struct CheckRow<'a> {
-    /// Of the rows above, at and below.
-    squared_residual: [&'a [f32]; 3],
-    /// Modulation by the albedo of the neighbourhood.
-    modulation: &'a [f32],
-    /// Modulation by the albedo of the pixel.
-    pixel_modulation: &'a [f32],
-    /// Variance of the noise relative to that of the shot.
-    noise: &'a [f32],
-    order_quality: &'a [f32],
-}
-
-impl<'a> CheckRow<'a> {
-    /// Row `y` of a scene, with the variance of the noise and the quality of the orders along it.
-    fn of(scene: &Scene<'_>, evidence: Evidence<'a>, y: usize, noise: &'a [f32], quality: &'a [f32]) -> Self {
-        let Evidence { map, pixel, .. } = evidence;
-        let (height, width) = (scene.grid.height, scene.grid.width);
-        Self {
-            squared_residual: around(y, height).map(|y| &pixel.squared_residual[y * width..][..width]),
-            modulation: &scene.row(map.modulation, y)[..width],
-            pixel_modulation: &pixel.modulation[y * width..][..width],
-            noise: &noise[..width],
-            order_quality: &quality[..width],
-        }
-    }
-}
-
-/// Verdicts on the pixels of a row.
-struct VerdictRow<'a> {
-    quality: &'a mut [f32],
-    /// First not 0 for pixels at or next to an order jump.
-    passed: &'a mut [u8],
-    consistent: &'a mut [u8],
-    /// Why a pixel with fringes is not valid, if it is not; other reasons stay.
-    reasons: &'a mut [Reason],
-}
-
-/// A pixel passes if its order has enough quality, it lies at no order jump, and the residuals of it and its neighbours are small; a
-/// wrong order leaves residuals in G and IR. It is consistent if its residual alone is small.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn check_row(known: &CheckRow, limits: Limits, [spare, sums]: [&mut Vec<f32>; 2], out: VerdictRow) {
-    let width = known.modulation.len();
-    sums.resize(width, 0.0);
-    sum_of_nine(known.squared_residual, width, spare, sums);
-    let (here, near) = (&known.squared_residual[1][..width], &sums[..width]);
-    let (modulation, pixel_modulation) = (&known.modulation[..width], &known.pixel_modulation[..width]);
-    let noise = &known.noise[..width];
-    let order_quality = &known.order_quality[..width];
-    let (quality, passed, consistent) =
-        (&mut out.quality[..width], &mut out.passed[..width], &mut out.consistent[..width]);
-    let reasons = &mut out.reasons[..width];
-    let floors = [RESIDUAL_NOISES_MAX, PIXEL_RESIDUAL_NOISES_MAX]
-        .map(|most| (most * limits.noise) * (most * limits.noise));
-    for x in 0..width {
-        let lit = modulation[x] > 0.0;
-        let share = MISFIT_MAX * modulation[x];
-        let pixel_share = PIXEL_MISFIT_MAX * pixel_modulation[x];
-        let agrees = near[x] <= 9.0 * (floors[0] * noise[x] + share * share)
-            && here[x] <= floors[1] * noise[x] + pixel_share * pixel_share;
-        quality[x] = order_quality[x] + hole_unless(lit);
-        let certain = lit & (order_quality[x] >= limits.quality_min);
-        let apart = passed[x] != 0;
-        passed[x] = u8::from(certain & agrees & !apart);
-        let doubt = if certain { Reason::SmallPiece } else { Reason::DoubtfulOrder };
-        let doubt = if agrees { doubt } else { Reason::Misfit };
-        let doubt = if apart { Reason::Discontinuity } else { doubt };
-        let open = lit & (reasons[x] == Reason::Returned);
-        reasons[x] = if open { doubt } else { reasons[x] };
-        consistent[x] = u8::from(lit & (here[x] <= floors[0] * noise[x] + pixel_share * pixel_share));
-    }
-}
-
 /// The phase of valid pixels, NaN elsewhere.
 #[multiversion(targets("x86_64+avx2"))]
 pub(super) fn copy_valid(valid: &[u8], phase: &[f32], out: &mut [f32]) {
     for (out, (valid, phase)) in out.iter_mut().zip(valid.iter().zip(phase)) {
         *out = *phase + hole_unless(*valid != 0);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_residual_of_a_dim_pixel_is_relative_to_its_light() {
-        // The same residual, a quarter of the modulation, of a pixel as bright as its neighbours and of one in a narrow shadow.
-        let (mut squared_residual, mut pixel_modulation) = ([0.0; 16], [0.4; 16]);
-        (squared_residual[4], squared_residual[12], pixel_modulation[12]) = (0.01, 0.01, 0.1);
-        let (mut quality, mut passed, mut consistent) = ([0.0; 16], [0; 16], [0; 16]);
-        let mut reasons = [Reason::Returned; 16];
-        let known = CheckRow {
-            squared_residual: [&[0.0; 16], &squared_residual, &[0.0; 16]],
-            modulation: &[0.4; 16],
-            pixel_modulation: &pixel_modulation,
-            noise: &[1.0; 16],
-            order_quality: &[1.0; 16],
-        };
-        let out = VerdictRow {
-            quality: &mut quality,
-            passed: &mut passed,
-            consistent: &mut consistent,
-            reasons: &mut reasons,
-        };
-        check_row(&known, Limits { noise: 0.01, quality_min: 0.1 }, [&mut Vec::new(), &mut Vec::new()], out);
-        for marks in [passed, consistent] {
-            assert!((0..16).all(|x| marks[x] == u8::from(x != 12)), "{marks:?}");
-        }
-        assert_eq!((reasons[12], reasons[0]), (Reason::Misfit, Reason::SmallPiece));
     }
 }

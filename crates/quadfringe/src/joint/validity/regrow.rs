@@ -3,22 +3,31 @@
 //! At an order jump one of the two sides is wrong, or a pixel sees both surfaces, and the exclusion removes a strip from each
 //! side. Orders are chosen for cells, so a cell across the rim of a surface makes all of its pixels doubtful. A wrong side is
 //! mostly a narrow strip, which is removed entirely. The remaining component takes back the pixels into which its phase continues
-//! straight and whose intensities agree with this phase. Between two surfaces that meet, holes remain.
+//! straight and whose intensities agree with this phase. Print that is finer than the windows of the photometry disagrees. So where the
+//! cells of the energy around a pixel lie on one surface, which determines its phase, it is taken back whatever its residual, unless
+//! its light drops as at a shadow. Between two surfaces that meet, holes remain.
 
 use crate::joint::cells::Grid;
+use crate::joint::params::shadows::SHARE_MIN;
 use crate::joint::params::tasks::GROUP;
 use crate::joint::params::validity::{AMBIGUOUS_REACH, FACING_REACH, SAME_SURFACE_RAD};
 use std::f32::consts::PI;
 
-/// Mark of a pixel that was added to a component. The other pixels of a component have the mark 1.
+/// Mark of a pixel that was added to a component because its light agrees. The other pixels of a component have the mark 1.
 pub(in crate::joint) const GROWN: u8 = 2;
+/// Mark of a pixel whose intensities agree with its phase.
+pub(super) const EXPLAINED: u8 = 1;
+/// Mark of a pixel whose intensities do not, but that lies on one surface with the cells of the energy around it.
+pub(super) const ON_SURFACE: u8 = 2;
 
 /// Maps that decide whether a pixel may be added.
 #[derive(Clone, Copy)]
 pub(super) struct Candidates<'a> {
+    /// Linear light of R, G, B, IR.
+    pub light: [&'a [f32]; 4],
     /// Absolute phase in rad.
     pub phase: &'a [f32],
-    /// 1 for pixels whose intensities agree with their order.
+    /// [`EXPLAINED`], [`ON_SURFACE`], or 0 for pixels that may not be added.
     pub consistent: &'a [u8],
     /// 1 for pixels at an order jump.
     pub at_jump: &'a [u8],
@@ -46,7 +55,7 @@ impl Regrow {
         for round in 0..grid.step.max(AMBIGUOUS_REACH) {
             taken.clear();
             open.retain(|&at| {
-                let continues = continues(grid, phase, components, at as usize);
+                let continues = continues(grid, candidates, components, at as usize);
                 if continues {
                     taken.push(at);
                 }
@@ -56,7 +65,9 @@ impl Regrow {
                 break;
             }
             for at in taken.iter().map(|&at| at as usize) {
-                (valid[at], components[at]) = (1, GROWN);
+                // The order of a pixel on one surface with the cells around is as certain as theirs.
+                let mark = if candidates.consistent[at] == EXPLAINED { GROWN } else { 1 };
+                (valid[at], components[at]) = (1, mark);
             }
             taken.retain(|&at| round >= AMBIGUOUS_REACH || candidates.at_jump[at as usize] != 0);
             far.append(taken);
@@ -73,7 +84,7 @@ impl Regrow {
         for y in 0..grid.height {
             let [consistent, valid] = [consistent, valid].map(|map| &map[y * grid.stride..][..grid.width]);
             for (i, (consistent, valid)) in consistent.chunks(GROUP).zip(valid.chunks(GROUP)).enumerate() {
-                let is_open = |x: &usize| consistent[*x] > valid[*x];
+                let is_open = |x: &usize| (consistent[*x] != 0) & (valid[*x] == 0);
                 // Most groups have no such pixel. A loop over the group without early exit compiles to vectors.
                 if (0..consistent.len()).fold(false, |any, x| any | is_open(&x)) {
                     let first = y * grid.stride + i * GROUP;
@@ -84,12 +95,16 @@ impl Regrow {
     }
 }
 
-/// Whether the phase of two pixels of a component continues straight into the pixel, in one of four directions.
-fn continues(grid: &Grid, phase: &[f32], components: &[u8], at: usize) -> bool {
+/// Whether the phase of two pixels of a component continues straight into the pixel, in one of four directions. If the light of the
+/// pixel does not agree with this phase, it must not be much less than that of the nearer one, as it would be in a shadow.
+fn continues(grid: &Grid, candidates: &Candidates<'_>, components: &[u8], at: usize) -> bool {
+    let Candidates { phase, light, consistent, .. } = candidates;
+    let sum = |at: usize| light.iter().map(|plane| plane[at]).sum::<f32>();
+    let least = if consistent[at] == EXPLAINED { 0.0 } else { SHARE_MIN };
     directions(grid, at, 2).any(|step| {
         let (near, far) = (at.wrapping_add_signed(step), at.wrapping_add_signed(2 * step));
         let straight = (2.0 * phase[near] - phase[far] - phase[at]).abs() < SAME_SURFACE_RAD;
-        (components[near] != 0) & (components[far] != 0) & straight
+        (components[near] != 0) & (components[far] != 0) & straight && sum(at) >= least * sum(near)
     })
 }
 
@@ -120,6 +135,7 @@ mod tests {
     /// columns around it.
     struct Step {
         grid: Grid,
+        light: Vec<f32>,
         phase: Vec<f32>,
         at_jump: Vec<u8>,
         valid: Vec<u8>,
@@ -135,7 +151,8 @@ mod tests {
                 (0..grid.pixels()).map(move |i| u8::from((from..to).contains(&(i % grid.stride))))
             };
             let valid = columns(13, 19).map(|marked| 1 - marked).collect();
-            Self { grid, phase, at_jump: columns(15, 17).collect(), valid }
+            let light = vec![0.5; grid.pixels()];
+            Self { grid, light, phase, at_jump: columns(15, 17).collect(), valid }
         }
 
         fn place(&self, x: usize, y: usize) -> usize {
@@ -145,7 +162,8 @@ mod tests {
         /// Valid pixels after growing into the consistent pixels.
         fn grown(&self, consistent: &[u8]) -> Vec<u8> {
             let (mut valid, mut components) = (self.valid.clone(), self.valid.clone());
-            let candidates = Candidates { phase: &self.phase, consistent, at_jump: &self.at_jump };
+            let light = [self.light.as_slice(); 4];
+            let candidates = Candidates { light, phase: &self.phase, consistent, at_jump: &self.at_jump };
             Regrow::default().run(&self.grid, &candidates, &mut valid, &mut components);
             assert!(
                 valid.iter().zip(&components).all(|(valid, component)| *valid == u8::from(*component > 0))
@@ -196,6 +214,24 @@ mod tests {
         let valid = step.grown(&consistent);
         let row = |y: usize| (13..19).filter(|&x| valid[step.place(x, y)] == 1).collect::<Vec<_>>();
         assert_eq!((row(3), row(7), row(15)), (vec![13, 14, 15], vec![13, 15], vec![]));
+    }
+
+    #[test]
+    fn a_pixel_on_the_surface_is_added_but_for_one_in_a_shadow() {
+        let mut step = Step::new();
+        let mut consistent = step.all();
+        // Print at columns 13 and 14 of one row, and a shadow there in another.
+        for x in 13..15 {
+            let [print, shadow] = [5, 9].map(|y| step.place(x, y));
+            (consistent[print], consistent[shadow]) = (ON_SURFACE, ON_SURFACE);
+            (step.light[print], step.light[shadow]) = (0.2, 0.1);
+        }
+        let valid = step.grown(&consistent);
+        let row = |y: usize| (13..15).map(|x| valid[step.place(x, y)]).collect::<Vec<_>>();
+        assert_eq!((row(5), row(9)), (vec![1, 1], vec![0, 0]));
+        // A pixel whose light agrees with its phase is added however dark it is.
+        (13..15).for_each(|x| consistent[step.place(x, 9)] = EXPLAINED);
+        assert_eq!(step.grown(&consistent)[step.place(14, 9)], 1);
     }
 
     #[test]
