@@ -1,7 +1,7 @@
 //! Limits of the pixels of a row by themselves and with their eight neighbours.
 
+use super::evidence::{Evidence, Limits};
 use super::regrow::{EXPLAINED, ON_SURFACE};
-use super::{Evidence, Limits};
 use crate::Reason;
 use crate::decode::output::hole_unless;
 use crate::joint::neighbours::{around, sum_of_nine};

@@ -4,16 +4,14 @@ mod check;
 mod close_steps;
 mod components;
 mod discontinuities;
+mod evidence;
 mod regrow;
 mod support;
 
 use super::cells::{RowMaps, TaskWork};
-use super::energy::Energy;
 use super::noise::NoiseByLight;
-use super::orders::Orders;
 use super::params::validity::{COMPONENT_SIDE, NEIGHBOURS_MIN, SEED_SIDE};
-use super::regions::RegionOrders;
-use super::scene::{PhaseMap, Scene};
+use super::scene::Scene;
 use crate::Reason;
 use crate::decode::output::hole_unless;
 use crate::parallel::slots::Slots;
@@ -21,42 +19,12 @@ use check::{CheckRow, VerdictRow, check_row};
 use close_steps::CloseSteps;
 use components::{Components, SizeLimits};
 use discontinuities::{Discontinuities, remove_narrow};
+pub(super) use evidence::{Evidence, Limits, PixelFit};
 use multiversion::multiversion;
 use rayon::prelude::*;
 pub(super) use regrow::GROWN;
 use regrow::Regrow;
 use support::Support;
-
-/// Results of the fit of step 6 for every pixel by itself, row by row without padding.
-#[derive(Clone, Copy)]
-pub(super) struct PixelFit<'a> {
-    /// Mean squared residual of the four channels, in linear light squared.
-    pub squared_residual: &'a [f32],
-    /// Modulation in linear light by the albedo of the pixel.
-    pub modulation: &'a [f32],
-}
-
-/// What decides the mask of a shot.
-#[derive(Clone, Copy)]
-pub(super) struct Evidence<'a> {
-    pub map: PhaseMap<'a>,
-    pub pixel: PixelFit<'a>,
-    pub orders: &'a Orders,
-    pub regions: &'a RegionOrders,
-    pub energy: &'a Energy,
-    /// Fringe numbers divided by the first.
-    pub ratios: [f32; 4],
-    pub limits: Limits,
-}
-
-/// Limits of a shot.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Limits {
-    /// Standard deviation of the intensities in linear light.
-    pub noise: f32,
-    /// Least quality of a valid order.
-    pub quality_min: f32,
-}
 
 /// The validity mask of a shot, with working maps.
 #[derive(Debug, Default)]
@@ -67,7 +35,7 @@ pub(super) struct Validity {
     close_steps: CloseSteps,
     /// First not 0 at or next to an order jump, then 1 for pixels that pass the limits; then 1 for pixels of components that may grow, and 1 or [`GROWN`] for those added.
     pub components: Vec<u8>,
-    /// 1 for pixels whose light agrees with their phase, or whose phase that of the pixels around determines.
+    /// Marks of the pixels that may be added to a component ([`regrow::Candidates::consistent`]).
     consistent: Vec<u8>,
     noise: NoiseByLight,
     support: Support,
