@@ -191,7 +191,10 @@ impl Joint {
         self.energy.minimise(&scene, prior, &mut self.pixels);
         let Pixels { phase, modulation, .. } = &mut self.pixels;
         // 8. Orders of regions, by the phase of the energy.
-        self.regions.settle(&scene, prior.noise, modulation, phase);
+        let energy = &self.energy;
+        let brightness =
+            |y: usize, work: &mut energy::Rows, out: &mut Vec<f32>| energy.brightness(&scene, y, work, out);
+        self.regions.settle(&scene, prior.noise, &brightness, modulation, phase);
     }
 
     /// Step 8: the mask of valid pixels, and the quality of the order of every lit pixel.

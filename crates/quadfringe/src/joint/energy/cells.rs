@@ -206,21 +206,25 @@ impl Cells {
         });
     }
 
-    /// Adds the interpolated correction to the phase of the pixels. Where it is too large, the modulation becomes 0.
-    pub fn correct(&self, scene: &Scene<'_>, pixels: &mut Pixels) {
+    /// Adds the interpolated correction to the phase of the pixels. Where it is too large, their reason is a misfit. They keep their
+    /// light only in cells that are `smooth`; elsewhere the modulation becomes 0.
+    pub fn correct(&self, scene: &Scene<'_>, smooth: &[bool], pixels: &mut Pixels) {
         let stride = scene.grid.stride;
         let Pixels { phase, modulation, reasons } = pixels;
         let planes = phase.par_chunks_mut(stride).zip(modulation.par_chunks_mut(stride));
         let rows = planes.zip(reasons.par_chunks_mut(stride)).enumerate();
-        rows.for_each_init(Rows::default, |rows, (y, ((phase, modulation), reasons))| {
+        rows.for_each_init(Default::default, |work: &mut (Rows, Vec<bool>), (y, planes)| {
+            let (rows, on_surface) = work;
+            let ((phase, modulation), reasons) = planes;
             self.interpolate(&self.phase, scene, y, rows);
-            let found = rows.sum.iter().zip(&rows.weight);
+            self.write_smooth(smooth, y, stride, on_surface);
+            let found = rows.sum.iter().zip(&rows.weight).zip(on_surface);
             let pixels = phase.iter_mut().zip(modulation).zip(reasons);
-            for (((phase, modulation), reason), (sum, weight)) in pixels.zip(found) {
+            for (((phase, modulation), reason), ((sum, weight), on_surface)) in pixels.zip(found) {
                 let correction = if *weight > 0.0 { sum / weight } else { 0.0 };
                 *phase += correction;
                 if correction.abs() > MOVED_MAX_RAD && *modulation > 0.0 {
-                    *modulation = 0.0;
+                    *modulation = if *on_surface { *modulation } else { 0.0 };
                     *reason = if *reason == Reason::Returned { Reason::Misfit } else { *reason };
                 }
             }
@@ -240,6 +244,16 @@ impl Cells {
             *sum = if *weight > 0.0 { *sum / weight } else { 0.0 };
         }
         &rows.sum
+    }
+
+    /// Mean albedo of R and B along row `y` of the scene, 0 where there is no lit cell.
+    pub fn brightness(&self, scene: &Scene<'_>, y: usize, rows: &mut Rows, out: &mut Vec<f32>) {
+        let [red, _, blue, _] = &self.light;
+        self.interpolate(red, scene, y, rows);
+        self.between(blue, scene, y, &mut rows.mix, out);
+        for (value, (red, weight)) in out.iter_mut().zip(rows.sum.iter().zip(&rows.weight)) {
+            *value = if *weight > 0.0 { 0.5 * (*value + red) / weight } else { 0.0 };
+        }
     }
 
     /// Albedo and contrast along row `y` of the scene.

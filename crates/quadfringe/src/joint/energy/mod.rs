@@ -57,8 +57,9 @@ pub(super) struct Prior {
 
 impl Energy {
     /// Corrects the absolute phase of the lit pixels of a scene, in place. Where the minimum lies far from the phase at the start,
-    /// one of the two is wrong. The modulation becomes 0 there, so that step 8 treats such pixels and their neighbours as it treats
-    /// the border of a shadow; their reason is a misfit.
+    /// one of the two is wrong, and the reason of the pixels is a misfit. Among cells of one surface (J44) it is the start, which
+    /// texture has spoilt. Elsewhere the modulation becomes 0, so that step 8 treats such pixels and their neighbours as it treats the
+    /// border of a shadow.
     pub fn minimise(&mut self, scene: &Scene<'_>, prior: Prior, pixels: &mut Pixels) {
         let factor = cell_px(scene.period_px);
         self.cells.average(scene, pixels.map(), factor);
@@ -82,13 +83,18 @@ impl Energy {
         let shares = |y, x| shares(tiles, &rows, &columns, [y, x]);
         cells.smooth_start(scene, |y, x| surface(shares(y, x)), &mut pixels.phase, smooth);
         cells.replace(|y, x| blend(shares(y, x)));
-        cells.correct(scene, pixels);
+        cells.correct(scene, smooth, pixels);
     }
 
     /// Albedo and contrast along row `y` of the scene.
     pub fn fringes<'a>(&self, scene: &Scene<'_>, y: usize, rows: &'a mut FringeRows) -> &'a FringeRows {
         self.cells.fringes(scene, y, rows);
         rows
+    }
+
+    /// Writes the mean albedo of R and B along row `y` of the scene, 0 where there is no lit cell.
+    pub fn brightness(&self, scene: &Scene<'_>, y: usize, rows: &mut Rows, out: &mut Vec<f32>) {
+        self.cells.brightness(scene, y, rows, out);
     }
 
     /// Writes for each of the `width` pixels of row `y` whether the cells around it lie on one surface (J44).

@@ -2,8 +2,9 @@
 //! not that of a fringe pattern at all, every node of it can be as wrong as it is sure.
 //!
 //! In a region the phase continues from pixel to pixel, so that all of it has the right order or is wrong by the same number of turns.
-//! G and IR are fitted by an offset and an amplitude in every tile of the region, for every number of turns. The squared residuals of
-//! the tiles around say which number explains the light, how much better than all others, and whether any does.
+//! G and IR are fitted by an offset and an amplitude in every tile of the region, for every number of turns, both in proportion to the
+//! brightness of R and B, which no order changes. The squared residuals of the tiles around say which number explains the light, how
+//! much better than all others, and whether any does.
 
 mod scores;
 mod sums;
@@ -13,14 +14,14 @@ use super::params::regions::{
     CERTAIN_EVIDENCE, CONTRADICTION_MAX, QUALITY, ROW_STEP, SHARED_PX, TILE_MIN_PX, TILE_SIDE,
 };
 use super::params::uncertainty::SETTLED_PROBABILITY_MIN;
-use super::scene::{PhaseMap, Scene};
+use super::scene::Scene;
 use crate::encoding::{Channel, FourChannel};
 use crate::parallel::slots::Slots;
 use rayon::prelude::*;
 use scores::{Choice, Contradiction, Scorer, Shifts};
 use std::f32::consts::TAU;
 use std::ops::Range;
-use sums::{RowTerms, Sums};
+use sums::{Brightness, RowTerms, Sums};
 
 /// The orders of the regions of a shot, with working memory.
 #[derive(Debug)]
@@ -118,7 +119,14 @@ impl RegionOrders {
 
     /// Judges the order of every lit pixel, and adds whole turns to the phase of regions whose light another order explains better;
     /// `noise` is the standard deviation of the light.
-    pub fn settle(&mut self, scene: &Scene<'_>, noise: f32, modulation: &[f32], phase: &mut [f32]) {
+    pub fn settle(
+        &mut self,
+        scene: &Scene<'_>,
+        noise: f32,
+        brightness: &impl Brightness,
+        modulation: &[f32],
+        phase: &mut [f32],
+    ) {
         self.found.iter_mut().flatten().for_each(Vec::clear);
         // A wrong order of a pair of projectors shifts IR by another angle at every pixel.
         if scene.pair.is_some() {
@@ -134,7 +142,7 @@ impl RegionOrders {
         self.regions.find(grid, &self.lit, phase);
         let shared = (SHARED_PX / scene.factor as f32).max(1.0).powi(2) / ROW_STEP as f32;
         let scorer = Scorer::new(self.ratios, self.range_rad, noise, shared);
-        self.measure(scene, &scorer, PhaseMap { phase, modulation });
+        self.measure(scene, &scorer, brightness, phase);
         self.choose(&scorer);
         self.judge(&scorer);
         let this = &*self;
@@ -168,7 +176,7 @@ impl RegionOrders {
     }
 
     /// Adds up the light of every part, and scores it.
-    fn measure(&mut self, scene: &Scene<'_>, scorer: &Scorer, map: PhaseMap<'_>) {
+    fn measure(&mut self, scene: &Scene<'_>, scorer: &Scorer, brightness: &impl Brightness, phase: &[f32]) {
         let (grid, tile_px, ratios) = (scene.grid, self.tile_px, self.ratios);
         let Self { regions, bands, slots, .. } = self;
         let regions = &*regions;
@@ -180,13 +188,13 @@ impl RegionOrders {
                 tiles.iter_mut().for_each(Vec::clear);
                 let rows = (band * tile_px..((band + 1) * tile_px).min(grid.height)).step_by(ROW_STEP);
                 for y in rows.filter(|&y| !regions.row(y).is_empty()) {
-                    terms.fill(scene, y, ratios, map);
+                    terms.fill(scene, y, ratios, phase, brightness);
                     for run in regions.row(y) {
                         let region = regions.of(run);
                         for InTile { column, pixels } in tiles_of(run.from as usize..run.to as usize, tile_px)
                         {
                             let at = y * grid.stride + pixels.start;
-                            let part = part_of(&mut tiles[column], region, map.phase[at]);
+                            let part = part_of(&mut tiles[column], region, phase[at]);
                             terms.add(pixels, &mut part.sums);
                         }
                     }

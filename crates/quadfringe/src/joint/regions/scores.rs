@@ -70,7 +70,7 @@ impl Scorer {
     /// Appends the scores of a part with this phase: of every number of turns from the least one up, then of every shift of G, then of
     /// IR.
     pub fn append(&self, sums: &Sums, phase: f32, out: &mut Vec<f32>) {
-        let fits = sums.channels.each_ref().map(|channel| Fit::new(channel, sums.weight));
+        let fits = sums.channels.each_ref().map(|channel| Fit::new(channel, sums));
         let present = [1, 3].map(|channel| weights(self.ratios)[channel]);
         let score = |channel: usize, shift: f32| {
             let residual = fits[channel].residual(shift) + self.variance;
@@ -159,7 +159,7 @@ impl Scorer {
 /// One shift in rad.
 const SHIFT: f32 = TAU / SHIFTS as f32;
 
-/// Second moments of the carrier and the light of one channel, per pixel and about their means.
+/// Second moments of the carrier and the light of one channel, per pixel, without what the brightness explains.
 struct Fit {
     cosine_cosine: f64,
     cosine_sine: f64,
@@ -170,9 +170,11 @@ struct Fit {
 }
 
 impl Fit {
-    fn new(sums: &ChannelSums, pixels: f32) -> Self {
-        let share = 1.0 / f64::from(pixels).max(1.0);
-        let [c, s, l] = [sums.cosine, sums.sine, sums.light].map(|sum| sum * share);
+    fn new(sums: &ChannelSums, part: &Sums) -> Self {
+        let share = 1.0 / f64::from(part.weight).max(1.0);
+        // Sums over the root of the squared brightness, so that their products are what the brightness explains.
+        let root = (share / part.bright_bright.max(f64::MIN_POSITIVE)).sqrt();
+        let [c, s, l] = [sums.bright_cosine, sums.bright_sine, sums.bright_light].map(|sum| sum * root);
         Self {
             cosine_cosine: sums.cosine_cosine * share - c * c,
             cosine_sine: sums.cosine_sine * share - c * s,

@@ -1,7 +1,7 @@
 //! Limits of the pixels of a row by themselves and with their eight neighbours.
 
 use super::evidence::{Evidence, Limits};
-use super::regrow::{EXPLAINED, ON_SURFACE};
+use super::regrow::Consistent;
 use crate::Reason;
 use crate::decode::output::hole_unless;
 use crate::joint::neighbours::{around, sum_of_nine};
@@ -54,14 +54,15 @@ pub(super) struct VerdictRow<'a> {
     pub quality: &'a mut [f32],
     /// First not 0 for pixels at or next to an order jump.
     pub passed: &'a mut [u8],
-    pub consistent: &'a mut [u8],
+    pub consistent: &'a mut [Consistent],
     /// Why a pixel with fringes is not valid, if it is not; other reasons stay.
     pub reasons: &'a mut [Reason],
 }
 
 /// A pixel passes if its order has enough quality, it lies at no order jump, and the residuals of it and its neighbours are small; a
 /// wrong order leaves residuals in G and IR. It is consistent if its residual alone is small, or if it lies on one surface with the cells
-/// around: their light determines its phase, and print that is finer than the windows of the photometry may leave any residual.
+/// around: their light determines its phase, and print that is finer than the windows of the photometry may leave any residual. A pixel
+/// that the energy has moved too far does not pass by itself, and its residual is that of the phase before.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn check_row(
     known: &CheckRow,
@@ -85,8 +86,10 @@ pub(super) fn check_row(
         let lit = modulation[x] > 0.0;
         let share = MISFIT_MAX * modulation[x];
         let pixel_share = PIXEL_MISFIT_MAX * pixel_modulation[x];
-        let agrees = near[x] <= 9.0 * (floors[0] * noise[x] + share * share)
-            && here[x] <= floors[1] * noise[x] + pixel_share * pixel_share;
+        let stays = reasons[x] != Reason::Misfit;
+        let agrees = stays
+            & (near[x] <= 9.0 * (floors[0] * noise[x] + share * share))
+            & (here[x] <= floors[1] * noise[x] + pixel_share * pixel_share);
         quality[x] = order_quality[x] + hole_unless(lit);
         let certain = lit & (order_quality[x] >= limits.quality_min);
         let apart = passed[x] != 0;
@@ -97,8 +100,9 @@ pub(super) fn check_row(
         let open = lit & (reasons[x] == Reason::Returned);
         reasons[x] = if open { doubt } else { reasons[x] };
         let explained = here[x] <= floors[0] * noise[x] + pixel_share * pixel_share;
-        let known = if explained { EXPLAINED } else { u8::from(on_one_surface[x]) * ON_SURFACE };
-        consistent[x] = if lit { known } else { 0 };
+        let by_surface = if on_one_surface[x] { Consistent::BySurface } else { Consistent::No };
+        let found = if explained & stays { Consistent::ByLight } else { by_surface };
+        consistent[x] = if lit { found } else { Consistent::No };
     }
 }
 
@@ -109,17 +113,18 @@ mod tests {
     /// What the check finds for a row of 16 pixels.
     struct Found {
         passed: [u8; 16],
-        consistent: [u8; 16],
+        consistent: [Consistent; 16],
         reasons: [Reason; 16],
     }
 
     /// Pixels 4 and 12 have the same residual, a quarter of the modulation around them. Pixel 4 is as bright as its neighbours, and pixel
-    /// 12 lies in a narrow shadow.
+    /// 12 lies in a narrow shadow. The energy has moved pixel 8.
     fn found(on_one_surface: bool) -> Found {
         let (mut squared_residual, mut pixel_modulation) = ([0.0; 16], [0.4; 16]);
         (squared_residual[4], squared_residual[12], pixel_modulation[12]) = (0.01, 0.01, 0.1);
-        let (mut quality, mut passed, mut consistent) = ([0.0; 16], [0; 16], [0; 16]);
+        let (mut quality, mut passed, mut consistent) = ([0.0; 16], [0; 16], [Consistent::No; 16]);
         let mut reasons = [Reason::Returned; 16];
+        reasons[8] = Reason::Misfit;
         let known = CheckRow {
             squared_residual: [&[0.0; 16], &squared_residual, &[0.0; 16]],
             modulation: &[0.4; 16],
@@ -141,8 +146,9 @@ mod tests {
     #[test]
     fn the_residual_of_a_dim_pixel_is_relative_to_its_light() {
         let Found { passed, consistent, reasons } = found(false);
-        for marks in [passed, consistent] {
-            assert!((0..16).all(|x| marks[x] == u8::from(x != 12)), "{marks:?}");
+        for x in (0..16).filter(|&x| x != 8) {
+            let expected = if x == 12 { (0, Consistent::No) } else { (1, Consistent::ByLight) };
+            assert_eq!((passed[x], consistent[x]), expected, "{x}");
         }
         assert_eq!((reasons[12], reasons[0]), (Reason::Misfit, Reason::SmallPiece));
     }
@@ -150,10 +156,16 @@ mod tests {
     #[test]
     fn a_pixel_on_one_surface_may_be_added_whatever_its_residual_but_does_not_vouch_for_its_order() {
         let Found { passed, consistent, .. } = found(true);
-        assert_eq!(passed[12], 0);
-        assert!(
-            (0..16).all(|x| consistent[x] == if x == 12 { ON_SURFACE } else { EXPLAINED }),
-            "{consistent:?}"
-        );
+        for x in 0..16 {
+            let by_surface = x == 8 || x == 12;
+            let expected = if by_surface { (0, Consistent::BySurface) } else { (1, Consistent::ByLight) };
+            assert_eq!((passed[x], consistent[x]), expected, "{x}");
+        }
+    }
+
+    #[test]
+    fn a_pixel_that_was_moved_too_far_needs_a_surface_around_it() {
+        let Found { passed, consistent, reasons } = found(false);
+        assert_eq!((passed[8], consistent[8], reasons[8]), (0, Consistent::No, Reason::Misfit));
     }
 }

@@ -23,7 +23,7 @@ pub(super) use evidence::{Evidence, Limits, PixelFit};
 use multiversion::multiversion;
 use rayon::prelude::*;
 pub(super) use regrow::GROWN;
-use regrow::Regrow;
+use regrow::{Consistent, Regrow};
 use support::Support;
 
 /// The validity mask of a shot, with working maps.
@@ -35,8 +35,8 @@ pub(super) struct Validity {
     close_steps: CloseSteps,
     /// First not 0 at or next to an order jump, then 1 for pixels that pass the limits; then 1 for pixels of components that may grow, and 1 or [`GROWN`] for those added.
     pub components: Vec<u8>,
-    /// Marks of the pixels that may be added to a component ([`regrow::Candidates::consistent`]).
-    consistent: Vec<u8>,
+    /// What says that a pixel may be added to a component.
+    consistent: Vec<Consistent>,
     noise: NoiseByLight,
     support: Support,
     labelling: Components,
@@ -92,7 +92,7 @@ impl Validity {
         reasons: &mut [Reason],
     ) {
         let (limits, grid) = (evidence.limits, scene.grid);
-        self.consistent.resize(grid.pixels(), 0);
+        self.consistent.resize(grid.pixels(), Consistent::No);
         let Self { components, consistent, close_steps, noise, support, slots, .. } = self;
         let close_steps = &*close_steps;
         noise.measure(scene.light, grid, evidence.ratios);

@@ -4,8 +4,8 @@
 //! side. Orders are chosen for cells, so a cell across the rim of a surface makes all of its pixels doubtful. A wrong side is
 //! mostly a narrow strip, which is removed entirely. The remaining component takes back the pixels into which its phase continues
 //! straight and whose intensities agree with this phase. Print that is finer than the windows of the photometry disagrees. So where the
-//! cells of the energy around a pixel lie on one surface, which determines its phase, it is taken back whatever its residual, unless
-//! its light drops as at a shadow. Between two surfaces that meet, holes remain.
+//! cells of the energy around a pixel lie on one surface, which determines its phase, it is taken back whatever its residual and at
+//! any distance, unless its light drops as at a shadow. Between two surfaces that meet, holes remain.
 
 use crate::joint::cells::Grid;
 use crate::joint::params::shadows::SHARE_MIN;
@@ -15,10 +15,18 @@ use std::f32::consts::PI;
 
 /// Mark of a pixel that was added to a component because its light agrees. The other pixels of a component have the mark 1.
 pub(in crate::joint) const GROWN: u8 = 2;
-/// Mark of a pixel whose intensities agree with its phase.
-pub(super) const EXPLAINED: u8 = 1;
-/// Mark of a pixel whose intensities do not, but that lies on one surface with the cells of the energy around it.
-pub(super) const ON_SURFACE: u8 = 2;
+
+/// What says that a pixel may be added to a component.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub(super) enum Consistent {
+    #[default]
+    No,
+    /// Its intensities agree with its phase.
+    ByLight,
+    /// Its intensities do not, but it lies on one surface with the cells of the energy around it.
+    BySurface,
+}
 
 /// Maps that decide whether a pixel may be added.
 #[derive(Clone, Copy)]
@@ -27,8 +35,7 @@ pub(super) struct Candidates<'a> {
     pub light: [&'a [f32]; 4],
     /// Absolute phase in rad.
     pub phase: &'a [f32],
-    /// [`EXPLAINED`], [`ON_SURFACE`], or 0 for pixels that may not be added.
-    pub consistent: &'a [u8],
+    pub consistent: &'a [Consistent],
     /// 1 for pixels at an order jump.
     pub at_jump: &'a [u8],
 }
@@ -43,16 +50,19 @@ pub(super) struct Regrow {
 }
 
 impl Regrow {
-    /// Adds pixels to `valid` and to the `components`, which are a subset of it. A pixel is added if it is consistent, at most a
-    /// cell (or the reach of exclusion) away from a component, and the phase of two pixels of the component that lie in line
-    /// with it continues straight into it. Pixels at an order jump, or further away than exclusion reaches, are not added if
-    /// another surface is valid nearby.
+    /// Adds pixels to `valid` and to the `components`, which are a subset of it. A pixel is added if it is consistent, and the phase of
+    /// two pixels of the component that lie in line with it continues straight into it. By its light alone it is added up to a cell (or
+    /// the reach of exclusion) away from a component. Pixels at an order jump, or further away than exclusion reaches, are not added
+    /// if another surface is valid nearby.
     pub fn run(&mut self, grid: &Grid, candidates: &Candidates<'_>, valid: &mut [u8], components: &mut [u8]) {
         let phase = candidates.phase;
         self.open_pixels(grid, candidates.consistent, valid);
         let Self { open, taken, far } = self;
         far.clear();
-        for round in 0..grid.step.max(AMBIGUOUS_REACH) {
+        for round in 0.. {
+            if round == grid.step.max(AMBIGUOUS_REACH) {
+                open.retain(|&at| candidates.consistent[at as usize] == Consistent::BySurface);
+            }
             taken.clear();
             open.retain(|&at| {
                 let continues = continues(grid, candidates, components, at as usize);
@@ -66,7 +76,7 @@ impl Regrow {
             }
             for at in taken.iter().map(|&at| at as usize) {
                 // The order of a pixel on one surface with the cells around is as certain as theirs.
-                let mark = if candidates.consistent[at] == EXPLAINED { GROWN } else { 1 };
+                let mark = if candidates.consistent[at] == Consistent::ByLight { GROWN } else { 1 };
                 (valid[at], components[at]) = (1, mark);
             }
             taken.retain(|&at| round >= AMBIGUOUS_REACH || candidates.at_jump[at as usize] != 0);
@@ -79,12 +89,13 @@ impl Regrow {
     }
 
     /// Lists the consistent pixels that are not valid.
-    fn open_pixels(&mut self, grid: &Grid, consistent: &[u8], valid: &[u8]) {
+    fn open_pixels(&mut self, grid: &Grid, consistent: &[Consistent], valid: &[u8]) {
         self.open.clear();
         for y in 0..grid.height {
-            let [consistent, valid] = [consistent, valid].map(|map| &map[y * grid.stride..][..grid.width]);
+            let row = y * grid.stride..y * grid.stride + grid.width;
+            let (consistent, valid) = (&consistent[row.clone()], &valid[row]);
             for (i, (consistent, valid)) in consistent.chunks(GROUP).zip(valid.chunks(GROUP)).enumerate() {
-                let is_open = |x: &usize| (consistent[*x] != 0) & (valid[*x] == 0);
+                let is_open = |x: &usize| (consistent[*x] != Consistent::No) & (valid[*x] == 0);
                 // Most groups have no such pixel. A loop over the group without early exit compiles to vectors.
                 if (0..consistent.len()).fold(false, |any, x| any | is_open(&x)) {
                     let first = y * grid.stride + i * GROUP;
@@ -100,7 +111,7 @@ impl Regrow {
 fn continues(grid: &Grid, candidates: &Candidates<'_>, components: &[u8], at: usize) -> bool {
     let Candidates { phase, light, consistent, .. } = candidates;
     let sum = |at: usize| light.iter().map(|plane| plane[at]).sum::<f32>();
-    let least = if consistent[at] == EXPLAINED { 0.0 } else { SHARE_MIN };
+    let least = if consistent[at] == Consistent::ByLight { 0.0 } else { SHARE_MIN };
     directions(grid, at, 2).any(|step| {
         let (near, far) = (at.wrapping_add_signed(step), at.wrapping_add_signed(2 * step));
         let straight = (2.0 * phase[near] - phase[far] - phase[at]).abs() < SAME_SURFACE_RAD;
@@ -160,7 +171,7 @@ mod tests {
         }
 
         /// Valid pixels after growing into the consistent pixels.
-        fn grown(&self, consistent: &[u8]) -> Vec<u8> {
+        fn grown(&self, consistent: &[Consistent]) -> Vec<u8> {
             let (mut valid, mut components) = (self.valid.clone(), self.valid.clone());
             let light = [self.light.as_slice(); 4];
             let candidates = Candidates { light, phase: &self.phase, consistent, at_jump: &self.at_jump };
@@ -171,8 +182,8 @@ mod tests {
             valid
         }
 
-        fn all(&self) -> Vec<u8> {
-            vec![1; self.grid.pixels()]
+        fn all(&self) -> Vec<Consistent> {
+            vec![Consistent::ByLight; self.grid.pixels()]
         }
     }
 
@@ -200,7 +211,7 @@ mod tests {
     fn inconsistent_pixels_and_bends_stay_holes() {
         let mut step = Step::new();
         let mut consistent = step.all();
-        consistent[step.place(14, 7)] = 0;
+        consistent[step.place(14, 7)] = Consistent::No;
         // Next to the step, the order of a narrow strip is too low by one, so that no pixel is valid near the other side. In the
         // lower rows the phase bends at column 13.
         for y in 0..20 {
@@ -223,24 +234,27 @@ mod tests {
         // Print at columns 13 and 14 of one row, and a shadow there in another.
         for x in 13..15 {
             let [print, shadow] = [5, 9].map(|y| step.place(x, y));
-            (consistent[print], consistent[shadow]) = (ON_SURFACE, ON_SURFACE);
+            (consistent[print], consistent[shadow]) = (Consistent::BySurface, Consistent::BySurface);
             (step.light[print], step.light[shadow]) = (0.2, 0.1);
         }
         let valid = step.grown(&consistent);
         let row = |y: usize| (13..15).map(|x| valid[step.place(x, y)]).collect::<Vec<_>>();
         assert_eq!((row(5), row(9)), (vec![1, 1], vec![0, 0]));
         // A pixel whose light agrees with its phase is added however dark it is.
-        (13..15).for_each(|x| consistent[step.place(x, 9)] = EXPLAINED);
+        (13..15).for_each(|x| consistent[step.place(x, 9)] = Consistent::ByLight);
         assert_eq!(step.grown(&consistent)[step.place(14, 9)], 1);
     }
 
     #[test]
-    fn growth_ends_after_a_cell() {
+    fn growth_by_light_alone_ends_after_a_cell_and_growth_by_the_surface_at_its_end() {
         let mut step = Step::new();
         step.at_jump.fill(0);
         step.valid = (0..step.grid.pixels()).map(|i| u8::from(i % step.grid.stride < 4)).collect();
-        let valid = step.grown(&step.all());
-        let row = &valid[step.place(0, 5)..][..32];
-        assert_eq!(row.iter().position(|&valid| valid == 0), Some(4 + step.grid.step));
+        let length = |consistent: &[Consistent]| {
+            let valid = step.grown(consistent);
+            valid[step.place(0, 5)..][..32].iter().position(|&valid| valid == 0)
+        };
+        assert_eq!(length(&step.all()), Some(4 + step.grid.step));
+        assert_eq!(length(&vec![Consistent::BySurface; step.grid.pixels()]), Some(16));
     }
 }
