@@ -195,8 +195,8 @@ def test_the_fringe_numbers_that_fit_best_are_named(monkeypatch: pytest.MonkeyPa
 
 
 def test_what_contradicts_every_order_is_no_data_with_a_warning() -> None:
-    # The right part is narrower than a fringe, and half of its light is taken for that of the part in front.
-    scene = isolated(74, 0.02, 14, surface="sphere")
+    # The left part is narrower than a fringe, and so is the step to the part behind.
+    scene = isolated(110, 0.02, 13, surface="steps")
     with pytest.warns(qf.DecodeWarning, match="of the pixels with fringes, green and infrared contradict .* no data"):
         shape = scenes.shape_of(scene, response="linear")
     contradicted = shape.quality == 0

@@ -145,15 +145,21 @@ def _numbers(offsets: Offsets, plan: Plan) -> Cause | None:
 
 
 def _in_part(offsets: Offsets, plan: Plan) -> Cause | None:
-    """Find a part where the closure is off by half a wrong order, in tiles that agree with those around."""
+    """Find a part where the closure is off by half a wrong order, in tiles that agree with those around.
+
+    Texture that differs from channel to channel moves the fringes too, but of tiles all over the shape.
+    """
     wave, least = np.exp(1j * offsets.closure_rad(plan.fringes.numbers)), 0.5 * wrong_order_rad(plan.fringes.numbers)
-    if not plan.fringes.infrared or np.count_nonzero(np.abs(np.angle(wave)) > least) < params.OFFSET_TILES_MIN:
+    alone = np.abs(np.angle(wave)) > least
+    if not plan.fringes.infrared or np.count_nonzero(alone) < params.OFFSET_TILES_MIN:
         return None
     near = np.abs(offsets.place[:, np.newaxis] - offsets.place).max(axis=2) <= 1
     # A product of matrices wakes threads of OpenBLAS, which go on without work on the cores that the next decode needs.
     around = np.where(near, wave, 0).mean(axis=1) / near.mean(axis=1)
-    off = (np.abs(around) > params.STEADY_MIN) & (np.minimum(*np.abs(np.angle([wave, around]))) > least)
-    if np.count_nonzero(off) < params.OFFSET_TILES_MIN or off.mean() > params.OFFSET_PART_MAX:
+    off = alone & (np.abs(around) > params.STEADY_MIN) & (np.abs(np.angle(around)) > least)
+    together = np.count_nonzero(off) / np.count_nonzero(alone)
+    few = np.count_nonzero(off) < params.OFFSET_TILES_MIN or together < params.OFFSET_TOGETHER_MIN
+    if few or off.mean() > params.OFFSET_PART_MAX:
         return None
     words = (
         f"in {off.mean():.0%} of the shape the infrared fringes lie {np.angle(wave[off].mean()):+.2f} rad off their "

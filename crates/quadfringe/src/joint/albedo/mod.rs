@@ -1,8 +1,8 @@
 //! Step 12: the albedo of every pixel, which is its light without fringes.
 //!
 //! The energy gives albedo and contrast of cells of a few pixels. A pixel at an edge takes the albedo of the cells on its side
-//! (J30). What then differs from its light is texture or noise. Texture is a relative change of all channels in common, with a
-//! variance that is estimated in blocks of pixels (empirical Bayes); the change of a pixel is its expectation (J31).
+//! (J30). What then differs from its light is texture or noise. Texture is a relative change of all channels in common, then of each
+//! alone, with variances that are estimated in blocks of pixels (empirical Bayes); the change of a pixel is its expectation (J31).
 
 mod edges;
 mod texture;
@@ -17,7 +17,7 @@ use crate::parallel::slots::Slots;
 use edges::choose;
 use multiversion::multiversion;
 use rayon::prelude::*;
-use texture::{Row, Texture, add_texture, take_texture};
+use texture::{Change, Row, Texture, add_texture, take_texture};
 
 /// The estimator, with its working memory.
 #[derive(Debug, Default)]
@@ -77,10 +77,12 @@ impl Work {
         let Self { rows: all, texture, .. } = self;
         let rows = &mut all[..rows];
         let blocks = rows[0].rest[0].len() / LANES;
-        texture.clear();
-        texture.resize(blocks, Texture::default());
-        rows.iter().for_each(|row| add_texture(row, noise, texture));
-        rows.iter_mut().for_each(|row| take_texture(row, noise, texture));
+        for change in [Change::Common, Change::Of(0), Change::Of(1), Change::Of(2), Change::Of(3)] {
+            texture.clear();
+            texture.resize(blocks, Texture::default());
+            rows.iter().for_each(|row| add_texture(row, change, noise, texture));
+            rows.iter_mut().for_each(|row| take_texture(row, change, noise, texture));
+        }
     }
 }
 

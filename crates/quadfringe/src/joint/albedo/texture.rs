@@ -13,6 +13,23 @@ pub(super) struct Row {
     pub rest: [Vec<f32>; 4],
 }
 
+/// Which channels change together.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Change {
+    Common,
+    /// Channel by channel.
+    Of(usize),
+}
+
+impl Change {
+    fn channels(self) -> std::ops::Range<usize> {
+        match self {
+            Self::Common => 0..4,
+            Self::Of(channel) => channel..channel + 1,
+        }
+    }
+}
+
 /// Sums that determine the variance of the texture in a block of `ROWS` rows and as many columns as a vector has.
 #[derive(Debug, Default, Clone, Copy)]
 pub(super) struct Texture {
@@ -23,16 +40,18 @@ pub(super) struct Texture {
 }
 
 impl Texture {
-    fn variance(self) -> f32 {
-        if self.power > 0.0 { (self.excess / self.power).max(0.0) } else { 0.0 }
+    /// The excess less two standard errors of it by noise of this variance, relative to the power.
+    fn variance(self, noise: f32) -> f32 {
+        let chance = 2.0 * noise * (2.0 * self.power).sqrt();
+        if self.power > 0.0 { ((self.excess - chance) / self.power).max(0.0) } else { 0.0 }
     }
 }
 
-/// Correlation of rest and signal over the four channels, and power of the signal.
+/// Correlation of rest and signal over the channels that change together, and power of the signal.
 #[inline(always)]
-fn correlation(row: &Row, at: usize) -> [Lanes; 2] {
+fn correlation(row: &Row, change: Change, at: usize) -> [Lanes; 2] {
     let [mut cross, mut power] = [[0.0; LANES]; 2];
-    for c in 0..4 {
+    for c in change.channels() {
         let [signal, rest] = take(&[lanes(&row.signal[c]), lanes(&row.rest[c])], at);
         for x in 0..LANES {
             cross[x] += signal[x] * rest[x];
@@ -42,11 +61,11 @@ fn correlation(row: &Row, at: usize) -> [Lanes; 2] {
     [cross, power]
 }
 
-/// Adds what a row tells of the texture, which the channels have in common.
+/// Adds what a row tells of the texture.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-pub(super) fn add_texture(row: &Row, noise: f32, blocks: &mut [Texture]) {
+pub(super) fn add_texture(row: &Row, change: Change, noise: f32, blocks: &mut [Texture]) {
     for (at, block) in blocks.iter_mut().enumerate() {
-        let [cross, power] = correlation(row, at);
+        let [cross, power] = correlation(row, change, at);
         for x in 0..LANES {
             block.excess += cross[x] * cross[x] - noise * power[x];
             block.power += power[x] * power[x];
@@ -54,19 +73,23 @@ pub(super) fn add_texture(row: &Row, noise: f32, blocks: &mut [Texture]) {
     }
 }
 
-/// Adds the expected texture of a row to the albedo.
+/// Adds the expected texture of a row to the albedo, and to the light that it predicts.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-pub(super) fn take_texture(row: &mut Row, noise: f32, blocks: &[Texture]) {
+pub(super) fn take_texture(row: &mut Row, channels: Change, noise: f32, blocks: &[Texture]) {
     for (at, block) in blocks.iter().enumerate() {
-        let ([cross, power], variance) = (correlation(row, at), block.variance());
+        let ([cross, power], variance) = (correlation(row, channels, at), block.variance(noise));
         let mut change = [0.0; LANES];
         for x in 0..LANES {
             change[x] = variance * cross[x] / (noise + variance * power[x]);
         }
-        for c in 0..4 {
-            let albedo = &mut lanes_mut(&mut row.albedo[c])[at];
+        for c in channels.channels() {
+            let [albedo, signal, rest] =
+                [&mut row.albedo[c], &mut row.signal[c], &mut row.rest[c]].map(|row| &mut lanes_mut(row)[at]);
             for x in 0..LANES {
+                let added = change[x] * signal[x];
                 albedo[x] *= 1.0 + change[x];
+                signal[x] += added;
+                rest[x] -= added;
             }
         }
     }

@@ -2,11 +2,10 @@
 
 use super::average::{Surfaces, mean, surfaces};
 use super::tile::Tile;
-use crate::Reason;
 use crate::joint::cells::{blend, spread};
 use crate::joint::infrared::wave;
-use crate::joint::params::energy::{MOVED_MAX_RAD, SIDE, USABLE_MIN};
-use crate::joint::scene::{PhaseMap, Pixels, Scene};
+use crate::joint::params::energy::{SIDE, USABLE_MIN};
+use crate::joint::scene::{PhaseMap, Scene};
 use crate::parallel::lanes::LANES;
 use rayon::prelude::*;
 
@@ -206,31 +205,6 @@ impl Cells {
         });
     }
 
-    /// Adds the interpolated correction to the phase of the pixels. Where it is too large, their reason is a misfit. They keep their
-    /// light only in cells that are `smooth`; elsewhere the modulation becomes 0.
-    pub fn correct(&self, scene: &Scene<'_>, smooth: &[bool], pixels: &mut Pixels) {
-        let stride = scene.grid.stride;
-        let Pixels { phase, modulation, reasons } = pixels;
-        let planes = phase.par_chunks_mut(stride).zip(modulation.par_chunks_mut(stride));
-        let rows = planes.zip(reasons.par_chunks_mut(stride)).enumerate();
-        rows.for_each_init(Default::default, |work: &mut (Rows, Vec<bool>), (y, planes)| {
-            let (rows, on_surface) = work;
-            let ((phase, modulation), reasons) = planes;
-            self.interpolate(&self.phase, scene, y, rows);
-            self.write_smooth(smooth, y, stride, on_surface);
-            let found = rows.sum.iter().zip(&rows.weight).zip(on_surface);
-            let pixels = phase.iter_mut().zip(modulation).zip(reasons);
-            for (((phase, modulation), reason), ((sum, weight), on_surface)) in pixels.zip(found) {
-                let correction = if *weight > 0.0 { sum / weight } else { 0.0 };
-                *phase += correction;
-                if correction.abs() > MOVED_MAX_RAD && *modulation > 0.0 {
-                    *modulation = if *on_surface { *modulation } else { 0.0 };
-                    *reason = if *reason == Reason::Returned { Reason::Misfit } else { *reason };
-                }
-            }
-        });
-    }
-
     /// Mean square of the correction, rad^2.
     pub fn correction(&self) -> f32 {
         let sum = |map: &[f32]| map.iter().map(|value| f64::from(value * value)).sum::<f64>();
@@ -239,21 +213,22 @@ impl Cells {
 
     /// Variance along row `y` of the scene, 0 where there is no lit cell.
     pub fn variance<'a>(&self, scene: &Scene<'_>, y: usize, rows: &'a mut Rows) -> &'a [f32] {
-        self.interpolate(&self.usable, scene, y, rows);
-        for (sum, weight) in rows.sum.iter_mut().zip(&rows.weight) {
-            *sum = if *weight > 0.0 { *sum / weight } else { 0.0 };
-        }
-        &rows.sum
+        self.mean(&self.usable, scene, y, rows)
+    }
+
+    /// Correction of the phase along row `y` of the scene, 0 where there is no lit cell.
+    pub(super) fn corrections<'a>(&self, scene: &Scene<'_>, y: usize, rows: &'a mut Rows) -> &'a [f32] {
+        self.mean(&self.phase, scene, y, rows)
     }
 
     /// Mean albedo of R and B along row `y` of the scene, 0 where there is no lit cell.
     pub fn brightness(&self, scene: &Scene<'_>, y: usize, rows: &mut Rows, out: &mut Vec<f32>) {
         let [red, _, blue, _] = &self.light;
-        self.interpolate(red, scene, y, rows);
-        self.between(blue, scene, y, &mut rows.mix, out);
-        for (value, (red, weight)) in out.iter_mut().zip(rows.sum.iter().zip(&rows.weight)) {
-            *value = if *weight > 0.0 { 0.5 * (*value + red) / weight } else { 0.0 };
-        }
+        out.clear();
+        out.extend_from_slice(self.mean(red, scene, y, rows));
+        out.iter_mut()
+            .zip(self.mean(blue, scene, y, rows))
+            .for_each(|(out, blue)| *out = 0.5 * (*out + blue));
     }
 
     /// Albedo and contrast along row `y` of the scene.
@@ -279,11 +254,15 @@ impl Cells {
         }
     }
 
-    /// Interpolates a map and the weight of its cells bilinearly along row `y` of the scene.
-    fn interpolate(&self, map: &[f32], scene: &Scene<'_>, y: usize, rows: &mut Rows) {
+    /// Interpolates a map bilinearly along row `y` of the scene, between lit cells alone; 0 where there is none.
+    fn mean<'a>(&self, map: &[f32], scene: &Scene<'_>, y: usize, rows: &'a mut Rows) -> &'a [f32] {
         let Rows { mix, sum, weight } = rows;
         self.between(map, scene, y, mix, sum);
         self.between(&self.inside, scene, y, mix, weight);
+        for (sum, weight) in sum.iter_mut().zip(weight) {
+            *sum = if *weight > 0.0 { *sum / *weight } else { 0.0 };
+        }
+        sum
     }
 
     /// Interpolates one map, which is 0 outside the lit cells.

@@ -1,10 +1,11 @@
-//! Detail of the start that is finer than the cells (J44). Where the cells around a pixel lie on one surface, it is noise, or texture
-//! that the windows of the start have mixed, and the pixel takes the surface through the cells. At the discontinuities of the surface
-//! the pixels keep it.
+//! From the cells back to the pixels. Where the cells around a pixel lie on one surface, detail of the start that is finer than a cell
+//! (J44) is noise, or texture that the windows of the start have mixed, and the pixel takes the surface through the cells. At the
+//! discontinuities of the surface the pixels keep it.
 
-use super::cells::Cells;
-use crate::joint::params::energy::CURVED_MAX;
-use crate::joint::scene::Scene;
+use super::cells::{Cells, Rows};
+use crate::Reason;
+use crate::joint::params::energy::{CURVED_MAX, MOVED_MAX_RAD};
+use crate::joint::scene::{Pixels, Scene};
 use rayon::prelude::*;
 
 /// What the fit has found for the surface at one cell.
@@ -76,6 +77,29 @@ impl Cells {
             out.extend(cells.iter().flat_map(|mark| std::iter::repeat_n(*mark, self.factor)));
         }
         out.resize(width, false);
+    }
+
+    /// Adds the interpolated correction to the phase of the pixels. Where it is too large, their reason is a misfit. They keep their
+    /// light only in cells that are `smooth`; elsewhere the modulation becomes 0.
+    pub fn correct(&self, scene: &Scene<'_>, smooth: &[bool], pixels: &mut Pixels) {
+        let stride = scene.grid.stride;
+        let Pixels { phase, modulation, reasons } = pixels;
+        let planes = phase.par_chunks_mut(stride).zip(modulation.par_chunks_mut(stride));
+        let rows = planes.zip(reasons.par_chunks_mut(stride)).enumerate();
+        rows.for_each_init(Default::default, |work: &mut (Rows, Vec<bool>), (y, planes)| {
+            let (rows, on_surface) = work;
+            let ((phase, modulation), reasons) = planes;
+            self.write_smooth(smooth, y, stride, on_surface);
+            let found = self.corrections(scene, y, rows).iter().zip(on_surface);
+            let pixels = phase.iter_mut().zip(modulation).zip(reasons);
+            for (((phase, modulation), reason), (correction, on_surface)) in pixels.zip(found) {
+                *phase += correction;
+                if correction.abs() > MOVED_MAX_RAD && *modulation > 0.0 {
+                    *modulation = if *on_surface { *modulation } else { 0.0 };
+                    *reason = if *reason == Reason::Returned { Reason::Misfit } else { *reason };
+                }
+            }
+        });
     }
 
     /// Loads the lines around a row of cells. After the row before, one of them is new.

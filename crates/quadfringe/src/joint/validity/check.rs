@@ -94,16 +94,22 @@ pub(super) fn check_row(
         let certain = lit & (order_quality[x] >= limits.quality_min);
         let apart = passed[x] != 0;
         passed[x] = u8::from(certain & agrees & !apart);
-        let doubt = if certain { Reason::SmallPiece } else { Reason::DoubtfulOrder };
-        let doubt = if agrees { doubt } else { Reason::Misfit };
-        let doubt = if apart { Reason::Discontinuity } else { doubt };
         let open = lit & (reasons[x] == Reason::Returned);
-        reasons[x] = if open { doubt } else { reasons[x] };
+        reasons[x] = if open { first_failure(apart, agrees, certain) } else { reasons[x] };
         let explained = here[x] <= floors[0] * noise[x] + pixel_share * pixel_share;
         let by_surface = if on_one_surface[x] { Consistent::BySurface } else { Consistent::No };
         let found = if explained & stays { Consistent::ByLight } else { by_surface };
-        consistent[x] = if lit { found } else { Consistent::No };
+        // Where the light contradicts every order, the quality is 0.
+        consistent[x] = if lit & (order_quality[x] > 0.0) { found } else { Consistent::No };
     }
+}
+
+/// The first test that a pixel fails; if it passes all, its neighbours or the component are too few.
+#[inline(always)]
+fn first_failure(apart: bool, agrees: bool, certain: bool) -> Reason {
+    let doubt = if certain { Reason::SmallPiece } else { Reason::DoubtfulOrder };
+    let doubt = if agrees { doubt } else { Reason::Misfit };
+    if apart { Reason::Discontinuity } else { doubt }
 }
 
 #[cfg(test)]
