@@ -11,9 +11,9 @@ one is missed.
 Shots that are turned by 90 degrees are counted apart: the joint method decodes them, the published one must refuse them
 with a message that names the turn.
 The data mark pixels whose truth is in doubt, at outlines above all. The figures of sure pixels leave them out.
-Of right orders the summary gives the RMS phase error of a shot, its mean and its worst, the mean of the medians, and
-the mean share of phase errors within one and three standard deviations, of the stated uncertainty and of the noise of
-the truth together.
+Of right orders the summary gives the RMS phase error of a shot, its mean and its worst, of all and of sure pixels, the
+mean of the medians, and the mean share of phase errors within one and three standard deviations, of the stated
+uncertainty and of the noise of the truth together.
 With --rings a table tells how far from the outline of an object, or from a jump of the true phase, its pixels are lost.
 The picture shows the ten shots with the fewest right pixels of the object, then the ten with the fewest right ones of
 those returned: green is right, red is wrong, blue is no data on the object; grey is not scored.
@@ -175,9 +175,11 @@ def summary(name: str, found: list[Judged]) -> dict[str, float]:
         "sure_right_mean_percent": float(np.mean([one.sure.right_percent for one in found])),
         "sure_right_of_returned_worst_percent": min(sure, default=np.nan),
     }
-    error_rad = [one.score.right_phase_rms_rad for one in found if one.score.returned_percent > 0]
-    if error_rad:
-        figures |= {"phase_rms_mean_rad": float(np.mean(error_rad)), "phase_rms_worst_rad": max(error_rad)}
+    for pixels, scores in (("", [one.score for one in found]), ("sure_", [one.sure for one in found])):
+        if error_rad := [score.right_phase_rms_rad for score in scores if score.returned_percent > 0]:
+            figures[f"{pixels}phase_rms_mean_rad"] = float(np.mean(error_rad))
+            figures[f"{pixels}phase_rms_worst_rad"] = max(error_rad)
+    if any(one.score.returned_percent > 0 for one in found):
         figures["phase_median_rad"] = float(np.nanmean([one.errors.median_rad for one in found]))
     inside = np.nanmean([one.errors.inside_percent for one in found], axis=0)
     figures |= {f"inside_{limit}_sd_percent": float(share) for limit, share in zip(DEVIATIONS, inside, strict=True)}

@@ -189,11 +189,12 @@ impl Joint {
         let prior = Prior { ratios: self.ratios, noise: self.coarse.noise, detail };
         let scene = self.pyramid.full.scene(frame.full);
         self.energy.minimise(&scene, prior, &mut self.pixels);
+        let Pixels { phase, modulation, .. } = &mut self.pixels;
         // 8. Orders of regions, by the phase of the energy.
         let energy = &self.energy;
         let brightness =
             |y: usize, work: &mut energy::Rows, out: &mut Vec<f32>| energy.brightness(&scene, y, work, out);
-        self.regions.settle(&scene, prior.noise, &brightness, &mut self.pixels);
+        self.regions.settle(&scene, prior.noise, &brightness, modulation, phase);
     }
 
     /// Step 8: the mask of valid pixels, and the quality of the order of every lit pixel.

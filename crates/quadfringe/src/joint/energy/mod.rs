@@ -57,9 +57,8 @@ pub(super) struct Prior {
 
 impl Energy {
     /// Corrects the absolute phase of the lit pixels of a scene, in place. Where the minimum lies far from the phase at the start,
-    /// one of the two is wrong, and the reason of the pixels is a misfit. Among cells of one surface (J44) it is the start, which
-    /// texture has spoilt. Elsewhere the modulation becomes 0, so that step 8 treats such pixels and their neighbours as it treats the
-    /// border of a shadow.
+    /// one of the two is wrong. The modulation becomes 0 there, so that step 8 treats such pixels and their neighbours as it treats
+    /// the border of a shadow; their reason is a misfit.
     pub fn minimise(&mut self, scene: &Scene<'_>, prior: Prior, pixels: &mut Pixels) {
         let factor = cell_px(scene.period_px);
         self.cells.average(scene, pixels.map(), factor);
@@ -83,7 +82,7 @@ impl Energy {
         let shares = |y, x| shares(tiles, &rows, &columns, [y, x]);
         cells.smooth_start(scene, |y, x| surface(shares(y, x)), &mut pixels.phase, smooth);
         cells.replace(|y, x| blend(shares(y, x)));
-        cells.correct(scene, smooth, pixels);
+        cells.correct(scene, pixels);
     }
 
     /// Albedo and contrast along row `y` of the scene.

@@ -79,23 +79,18 @@ impl Cells {
         out.resize(width, false);
     }
 
-    /// Adds the interpolated correction to the phase of the pixels. Where it is too large, their reason is a misfit. They keep their
-    /// light only in cells that are `smooth`; elsewhere the modulation becomes 0.
-    pub fn correct(&self, scene: &Scene<'_>, smooth: &[bool], pixels: &mut Pixels) {
+    /// Adds the interpolated correction to the phase of the pixels. Where it is too large, the modulation becomes 0.
+    pub fn correct(&self, scene: &Scene<'_>, pixels: &mut Pixels) {
         let stride = scene.grid.stride;
         let Pixels { phase, modulation, reasons } = pixels;
         let planes = phase.par_chunks_mut(stride).zip(modulation.par_chunks_mut(stride));
         let rows = planes.zip(reasons.par_chunks_mut(stride)).enumerate();
-        rows.for_each_init(Default::default, |work: &mut (Rows, Vec<bool>), (y, planes)| {
-            let (rows, on_surface) = work;
-            let ((phase, modulation), reasons) = planes;
-            self.write_smooth(smooth, y, stride, on_surface);
-            let found = self.corrections(scene, y, rows).iter().zip(on_surface);
+        rows.for_each_init(Rows::default, |rows, (y, ((phase, modulation), reasons))| {
             let pixels = phase.iter_mut().zip(modulation).zip(reasons);
-            for (((phase, modulation), reason), (correction, on_surface)) in pixels.zip(found) {
+            for (((phase, modulation), reason), correction) in pixels.zip(self.corrections(scene, y, rows)) {
                 *phase += correction;
                 if correction.abs() > MOVED_MAX_RAD && *modulation > 0.0 {
-                    *modulation = if *on_surface { *modulation } else { 0.0 };
+                    *modulation = 0.0;
                     *reason = if *reason == Reason::Returned { Reason::Misfit } else { *reason };
                 }
             }

@@ -14,8 +14,7 @@ use super::params::regions::{
     CERTAIN_EVIDENCE, CONTRADICTION_MAX, QUALITY, ROW_STEP, SHARED_PX, TILE_MIN_PX, TILE_SIDE,
 };
 use super::params::uncertainty::SETTLED_PROBABILITY_MIN;
-use super::scene::{Pixels, Scene};
-use crate::Reason;
+use super::scene::Scene;
 use crate::encoding::{Channel, FourChannel};
 use crate::parallel::slots::Slots;
 use rayon::prelude::*;
@@ -125,7 +124,8 @@ impl RegionOrders {
         scene: &Scene<'_>,
         noise: f32,
         brightness: &impl Brightness,
-        pixels: &mut Pixels,
+        modulation: &[f32],
+        phase: &mut [f32],
     ) {
         self.found.iter_mut().flatten().for_each(Vec::clear);
         // A wrong order of a pair of projectors shifts IR by another angle at every pixel.
@@ -135,13 +135,9 @@ impl RegionOrders {
         let grid = scene.grid;
         self.tile_px = ((TILE_SIDE * scene.period_px).round() as usize).max(TILE_MIN_PX);
         self.lit.resize(grid.pixels(), 0);
-        let Pixels { phase, modulation, reasons } = pixels;
-        let known = modulation.par_chunks(grid.stride).zip(reasons.par_chunks(grid.stride));
-        self.lit.par_chunks_mut(grid.stride).zip(known).for_each(|(lit, (modulation, reasons))| {
-            for (lit, (modulation, reason)) in lit.iter_mut().zip(modulation.iter().zip(reasons)) {
-                // A pixel that the energy has moved too far connects no surfaces.
-                *lit = u8::from((*modulation > 0.0) & (*reason != Reason::Misfit));
-            }
+        let lit = self.lit.par_chunks_mut(grid.stride).zip(modulation.par_chunks(grid.stride));
+        lit.for_each(|(lit, modulation)| {
+            lit.iter_mut().zip(modulation).for_each(|(lit, modulation)| *lit = u8::from(*modulation > 0.0));
         });
         self.regions.find(grid, &self.lit, phase);
         let shared = (SHARED_PX / scene.factor as f32).max(1.0).powi(2) / ROW_STEP as f32;

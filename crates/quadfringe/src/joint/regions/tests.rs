@@ -53,19 +53,17 @@ impl Case {
         let light = self.light.each_ref().map(Vec::as_slice);
         let scene =
             Scene { light, usable: &usable, grid: &self.grid, period_px: 24.0, factor: 1, pair: None };
-        let mut orders = RegionOrders::new(&code);
-        let reasons = vec![Reason::Returned; usable.len()];
-        let mut pixels = Pixels { phase: self.phase.clone(), modulation: usable.clone(), reasons };
+        let (mut orders, mut phase) = (RegionOrders::new(&code), self.phase.clone());
         let stride = self.grid.stride;
         let brightness = |y: usize, _: &mut Rows, out: &mut Vec<f32>| {
             out.clear();
             out.extend_from_slice(&self.brightness[y * stride..][..stride]);
         };
-        orders.settle(&scene, 0.01, &brightness, &mut pixels);
+        orders.settle(&scene, 0.01, &brightness, &usable, &mut phase);
         let mut certainty = vec![0.0; self.grid.width];
         orders.parts(50, |pixels, found| found.raise(&vec![1.0; pixels.len()], &mut certainty[pixels]));
         let row = 50 * self.grid.stride;
-        let gained = [80, 20].map(|x| ((pixels.phase[row + x] - self.phase[row + x]) / TAU).round());
+        let gained = [80, 20].map(|x| ((phase[row + x] - self.phase[row + x]) / TAU).round());
         (gained, [80, 20].map(|x| certainty[x]))
     }
 }

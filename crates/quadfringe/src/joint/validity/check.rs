@@ -61,8 +61,8 @@ pub(super) struct VerdictRow<'a> {
 
 /// A pixel passes if its order has enough quality, it lies at no order jump, and the residuals of it and its neighbours are small; a
 /// wrong order leaves residuals in G and IR. It is consistent if its residual alone is small, or if it lies on one surface with the cells
-/// around: their light determines its phase, and print that is finer than the windows of the photometry may leave any residual. A pixel
-/// that the energy has moved too far does not pass by itself, and its residual is that of the phase before.
+/// around and its order has enough quality: their light determines its phase, and print that is finer than the windows of the photometry
+/// may leave any residual, or have spoilt the phase from which the energy has moved it.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn check_row(
     known: &CheckRow,
@@ -86,21 +86,19 @@ pub(super) fn check_row(
         let lit = modulation[x] > 0.0;
         let share = MISFIT_MAX * modulation[x];
         let pixel_share = PIXEL_MISFIT_MAX * pixel_modulation[x];
-        let stays = reasons[x] != Reason::Misfit;
-        let agrees = stays
-            & (near[x] <= 9.0 * (floors[0] * noise[x] + share * share))
-            & (here[x] <= floors[1] * noise[x] + pixel_share * pixel_share);
-        quality[x] = order_quality[x] + hole_unless(lit);
-        let certain = lit & (order_quality[x] >= limits.quality_min);
+        let agrees = near[x] <= 9.0 * (floors[0] * noise[x] + share * share)
+            && here[x] <= floors[1] * noise[x] + pixel_share * pixel_share;
+        // The energy has moved the phase too far for the pixel to pass by itself.
+        let moved = reasons[x] == Reason::Misfit;
+        quality[x] = order_quality[x] + hole_unless(lit | moved);
+        let certain = (lit | moved) & (order_quality[x] >= limits.quality_min);
         let apart = passed[x] != 0;
-        passed[x] = u8::from(certain & agrees & !apart);
+        passed[x] = u8::from(lit & certain & agrees & !apart);
         let open = lit & (reasons[x] == Reason::Returned);
         reasons[x] = if open { first_failure(apart, agrees, certain) } else { reasons[x] };
-        let explained = here[x] <= floors[0] * noise[x] + pixel_share * pixel_share;
-        let by_surface = if on_one_surface[x] { Consistent::BySurface } else { Consistent::No };
-        let found = if explained & stays { Consistent::ByLight } else { by_surface };
-        // Where the light contradicts every order, the quality is 0.
-        consistent[x] = if lit & (order_quality[x] > 0.0) { found } else { Consistent::No };
+        let explained = lit & (here[x] <= floors[0] * noise[x] + pixel_share * pixel_share);
+        let by_surface = if certain & on_one_surface[x] { Consistent::BySurface } else { Consistent::No };
+        consistent[x] = if explained { Consistent::ByLight } else { by_surface };
     }
 }
 
@@ -131,9 +129,11 @@ mod tests {
         let (mut quality, mut passed, mut consistent) = ([0.0; 16], [0; 16], [Consistent::No; 16]);
         let mut reasons = [Reason::Returned; 16];
         reasons[8] = Reason::Misfit;
+        let mut modulation = [0.4; 16];
+        modulation[8] = 0.0;
         let known = CheckRow {
             squared_residual: [&[0.0; 16], &squared_residual, &[0.0; 16]],
-            modulation: &[0.4; 16],
+            modulation: &modulation,
             pixel_modulation: &pixel_modulation,
             noise: &[1.0; 16],
             order_quality: &[1.0; 16],
