@@ -121,10 +121,9 @@ pub const PIVOT_RIDGE: f32 = 1e-6;
 /// on which pixels lose detail finer than a cell (J44). Larger: steps lower than a radian are rounded (with 15 their error is a tenth
 /// larger). Smaller: texture bends the surface. `python evaluation/sensitivity.py --only energy::CURVED_MAX`.
 pub const CURVED_MAX: f32 = 5.0;
-/// Greatest correction of the phase of a valid pixel, in rad. Larger: pixels in a wrong minimum stay (twice: photographs return 1.6
-/// points more with 11 % more error, and a wrong dark level bends the phase by so much that other faults are named: `pytest
-/// tests/test_black.py`). Smaller: pixels whose start is wrong are lost (half: 7 points of photographs, 1 point of the bottle). `python
-/// evaluation/sensitivity.py --only energy::MOVED_MAX_RAD`.
+/// Greatest correction of the phase, in rad, of a pixel that is valid by itself. Larger: pixels in a wrong minimum stay, and a wrong dark
+/// level bends the phase by so much that other faults are named (`pytest tests/test_black.py`). Smaller: pixels whose start is wrong are
+/// lost at outlines; on one surface region growing returns them. `python evaluation/sensitivity.py --only energy::MOVED_MAX_RAD`.
 pub const MOVED_MAX_RAD: f32 = 0.35;
 
 /// Difference of the logarithm of the albedo between neighbouring cells from which a tile has more starts. Larger: patches of

@@ -4,8 +4,8 @@
 //! side. Orders are chosen for cells, so a cell across the rim of a surface makes all of its pixels doubtful. A wrong side is
 //! mostly a narrow strip, which is removed entirely. The remaining component takes back the pixels into which its phase continues
 //! straight and whose intensities agree with this phase. Print that is finer than the windows of the photometry disagrees. So where the
-//! cells of the energy around a pixel lie on one surface, which determines its phase, it is taken back whatever its residual and at
-//! any distance, unless its light drops as at a shadow. Between two surfaces that meet, holes remain.
+//! cells of the energy around a pixel lie on one surface, which determines its phase, it is taken back whatever its residual, however
+//! far the energy has moved it and at any distance, unless its light drops as at a shadow. Between two surfaces that meet, holes remain.
 
 use crate::joint::cells::Grid;
 use crate::joint::params::shadows::SHARE_MIN;
@@ -24,7 +24,7 @@ pub(super) enum Consistent {
     No,
     /// Its intensities agree with its phase.
     ByLight,
-    /// Its intensities do not, but it lies on one surface with the cells of the energy around it.
+    /// Its intensities do not, or the energy has moved it too far, but it lies on one surface with the cells of the energy around it.
     BySurface,
 }
 
