@@ -179,7 +179,7 @@ def summary(name: str, found: list[Judged]) -> dict[str, float]:
         if error_rad := [score.right_phase_rms_rad for score in scores if score.returned_percent > 0]:
             figures[f"{pixels}phase_rms_mean_rad"] = float(np.mean(error_rad))
             figures[f"{pixels}phase_rms_worst_rad"] = max(error_rad)
-    if any(one.score.returned_percent > 0 for one in found):
+    if returned:
         figures["phase_median_rad"] = float(np.nanmean([one.errors.median_rad for one in found]))
     inside = np.nanmean([one.errors.inside_percent for one in found], axis=0)
     figures |= {f"inside_{limit}_sd_percent": float(share) for limit, share in zip(DEVIATIONS, inside, strict=True)}

@@ -66,7 +66,7 @@ ALLOWED: dict[tuple[str, str], str] = {
             *(("joint", name) for name in ("A_R", "A_B", "P_R", "P_B", "A_G", "A_IR", "B_G", "B_IR", "WEAKEST")),
             *(("joint", name) for name in ("W", "C", "S", "CC", "CS")),
             *(("joint", name) for name in ("P", "RATIO", "PURITY", "MODULATION", "FIRST", "WEIGHT")),
-            *(("joint", name) for name in ("GROWN",)),
+            ("joint", "GROWN"),
             ("mesh", "FALLS"),
         ],
         "place in an array, or mark of a state",

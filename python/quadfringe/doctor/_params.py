@@ -48,9 +48,8 @@ FORM_SHARE = (1e-4, 4e-4)
 # Bow of a flat plate, share of its diagonal. Sound: 0.00002; a distortion of 0.1 that the calibration does not know:
 # 0.001 to 0.003. A plate of float glass is flat to 0.0001.
 BOW_SHARE = (2e-4, 5e-4)
-# Standard deviations above which an error of scale, form or bow counts. Smaller ones name chance and waves: a plate
-# whose light of exponent 2 counts as linear has a bow of 3.3 (`pytest tests/test_doctor_board.py -k response`).
-SCALE_SDS, FORM_SDS, BOW_SDS = 4.0, 2.0, 4.0
+# Standard deviations above which an error of scale, form or bow counts. Smaller ones name chance and waves.
+SCALE_SDS, FORM_SDS, BOW_SDS = 4.0, 2.0, 3.0
 
 # --- Limits (warning, fault): decoding
 

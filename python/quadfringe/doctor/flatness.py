@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,17 +71,17 @@ def flatness_of(shape: Shape, within: Mask | None = None) -> Flatness:
     terms = _quadratic(2 * (places - low) / (high - low) - 1)
     distance = plane.distances_mm(xyz_mm[kept])
     tiles = _tiles(kept, terms, distance)
-    form = np.asarray(np.linalg.lstsq(tiles.terms, tiles.distance_mm, rcond=None)[0], np.float64)
-    rest = distance - terms @ form
-    wave = _waves(rest, shape.phase_rad[kept].astype(np.float64))
-    worst = int(np.argmax(wave))
-    bow = _bow(tiles, form, terms)
+    rest = distance - terms @ _form(tiles)
+    waves = _waves(rest, shape.phase_rad[kept].astype(np.float64))
+    worst = int(np.argmax(waves.amplitude_mm))
+    # A tile holds about a fringe, so that waves of the fringes beat with the tiles, which would look like a bow.
+    bow = _bow(tiles.measuring(distance - waves.distance_mm), terms)
     return Flatness(
         bow_mm=bow.range_mm,
         bow_sd_mm=bow.sd_mm,
         noise_mm=NORMAL * float(np.median(np.abs(tiles.without_planes(terms, rest)))),
         stated_mm=_stated(shape, kept, plane.normal),
-        wave_rad=float(wave[worst]) / per_rad_mm,
+        wave_rad=float(waves.amplitude_mm[worst]) / per_rad_mm,
         wave_harmonic=worst + 1,
         size_mm=float(np.linalg.norm(high - low)),
         displaced=displaced,
@@ -146,6 +146,10 @@ class _Tiles:
     terms: Array
     distance_mm: Array
 
+    def measuring(self, distance: Array) -> _Tiles:
+        """Give the same tiles with the medians of other distances (n,), mm."""
+        return replace(self, distance_mm=np.array([np.median(distance[group]) for group in self.points]))
+
     def without_planes(self, terms: Array, values: Array) -> Array:
         """Give the values (n,) in tiles, each without the plane that fits it."""
         flat = terms[:, :3]
@@ -173,8 +177,14 @@ class _Bow:
     sd_mm: float
 
 
-def _bow(tiles: _Tiles, form: Array, terms: Array) -> _Bow:
+def _form(tiles: _Tiles) -> Array:
+    """Give the coefficients of the quadratic surface through the tiles, mm."""
+    return np.asarray(np.linalg.lstsq(tiles.terms, tiles.distance_mm, rcond=None)[0], np.float64)
+
+
+def _bow(tiles: _Tiles, terms: Array) -> _Bow:
     """Take the best plane out of the quadratic surface; what is left has its range between two of the points."""
+    form = _form(tiles)
     flat = np.linalg.lstsq(tiles.terms[:, :3], tiles.terms, rcond=None)[0]
     points = terms[:: max(1, len(terms) // 20_000)]
     bent = points - points[:, :3] @ flat
@@ -186,13 +196,21 @@ def _bow(tiles: _Tiles, form: Array, terms: Array) -> _Bow:
     return _Bow(float(np.ptp(part)), float(np.sqrt(max(float(ends @ covariance @ ends), 0.0))))
 
 
-def _waves(rest: Array, phase_rad: Array) -> Array:
-    """Give the amplitude of each harmonic of the fringes in the rest, mm."""
+@dataclass(frozen=True)
+class _FringeWaves:
+    """Amplitude of each harmonic of the fringes, (HARMONICS,), and their sum at every point, (n,), both in mm."""
+
+    amplitude_mm: Array
+    distance_mm: Array
+
+
+def _waves(rest: Array, phase_rad: Array) -> _FringeWaves:
+    """Fit waves that follow the fringes to the rest, mm."""
     step = max(1, len(rest) // 100_000)
-    turns = np.arange(1, HARMONICS + 1) * phase_rad[::step, None]
+    turns = np.arange(1, HARMONICS + 1) * phase_rad[:, None]
     waves = np.concatenate([np.cos(turns), np.sin(turns)], axis=1)
-    found = np.linalg.lstsq(waves, rest[::step], rcond=None)[0]
-    return np.asarray(np.hypot(found[:HARMONICS], found[HARMONICS:]))
+    found = np.linalg.lstsq(waves[::step], rest[::step], rcond=None)[0]
+    return _FringeWaves(np.hypot(found[:HARMONICS], found[HARMONICS:]), waves @ found)
 
 
 def _stated(shape: Shape, kept: Mask, normal: Array) -> float:
