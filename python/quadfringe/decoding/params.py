@@ -132,9 +132,10 @@ ROW_STRIDE = 4
 OFFSET_TILE_PX, OFFSET_SHARE = 96, 0.3
 # Fewest tiles from which a fault is named. A smaller number names faults for the print in a single tile.
 OFFSET_TILES_MIN = 4
-# Least share of the tiles that are off by as much which agree with those around and so are a part. Photographs that
-# differ from channel to channel had 0.26 at most when it was set, broken parts 0.54 or more; these tests hold it:
-# `pytest tests/test_channel_offsets.py tests/test_trusted.py tests/test_texture.py`. A smaller share calls texture a shift, a larger one misses small parts.
+# Least share of the tiles that are off by as much which agree with those around and so are a part. When it was set,
+# photographs that differ from channel to channel had 0.26 at most, broken parts 0.54 or more; `pytest
+# tests/test_channel_offsets.py tests/test_trusted.py tests/test_texture.py` hold it. A smaller share calls texture a
+# shift, a larger one misses small parts.
 OFFSET_TOGETHER_MIN = 0.4
 # Share of the lit pixels with quality 0, because green and infrared contradict every order, from which the shot is
 # decoded once more with them to name the cause. A smaller share costs time, a larger one takes parts out silently
