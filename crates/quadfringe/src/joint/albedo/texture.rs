@@ -1,6 +1,6 @@
 //! Texture that is finer than the cells (J31).
 
-use crate::parallel::lanes::{LANES, Lanes, lanes, lanes_mut, take};
+use crate::parallel::lanes::{LANES, Lanes, lanes, lanes_mut, put, take};
 use multiversion::multiversion;
 
 /// One row of pixels, R, G, B, IR.
@@ -77,20 +77,25 @@ pub(super) fn add_texture(row: &Row, change: Change, noise: f32, blocks: &mut [T
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 pub(super) fn take_texture(row: &mut Row, channels: Change, noise: f32, blocks: &[Texture]) {
     for (at, block) in blocks.iter().enumerate() {
-        let ([cross, power], variance) = (correlation(row, channels, at), block.variance(noise));
+        let variance = block.variance(noise);
+        if variance == 0.0 {
+            continue;
+        }
+        let [cross, power] = correlation(row, channels, at);
         let mut change = [0.0; LANES];
         for x in 0..LANES {
             change[x] = variance * cross[x] / (noise + variance * power[x]);
         }
         for c in channels.channels() {
-            let [albedo, signal, rest] =
-                [&mut row.albedo[c], &mut row.signal[c], &mut row.rest[c]].map(|row| &mut lanes_mut(row)[at]);
+            let mut rows = [&mut row.albedo[c], &mut row.signal[c], &mut row.rest[c]].map(|row| lanes_mut(row));
+            let [mut albedo, mut signal, mut rest] = rows.each_ref().map(|row| row[at]);
             for x in 0..LANES {
                 let added = change[x] * signal[x];
                 albedo[x] *= 1.0 + change[x];
                 signal[x] += added;
                 rest[x] -= added;
             }
+            put(&mut rows, at, &[albedo, signal, rest]);
         }
     }
 }

@@ -1,10 +1,10 @@
 //! The unknowns of one cell with its neighbours held fixed.
 
-use super::plane::{Derivatives, Plane, STRIDE, Weights, total, vectors};
+use super::plane::{Derivatives, Plane, STRIDE, Weights, row, total};
 use super::scales::Information;
 use crate::joint::model::{count, weights as channel_weights};
-use crate::joint::params::energy::{CONTRAST_RIDGE, RIDGE};
-use crate::parallel::lanes::{LANES, Lanes};
+use crate::joint::params::energy::{CONTRAST_RIDGE, RIDGE, SIDE};
+use crate::parallel::lanes::{LANES, Lanes, add};
 use multiversion::multiversion;
 
 /// Diagonal of the matrix of bending.
@@ -76,21 +76,26 @@ pub(super) fn block(derivatives: &Derivatives, weights: &Weights, ratios: [f32; 
 pub(super) fn information(derivatives: &Derivatives, weights: &Weights, ratios: [f32; 4]) -> Information {
     let share = 1.0 / count(ratios);
     let [mut phase, mut albedo, mut contrast, mut cells] = [0.0f64; 4];
-    for at in vectors() {
-        let block = block(derivatives, weights, ratios, at);
-        let (mut squares, mut fringes, mut count) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-        for c in 0..4 {
-            let (by_albedo, by_contrast) = (derivatives.albedo[c].get(at), derivatives.contrast[c].get(at));
-            for x in 0..LANES {
-                squares[x] += share * by_albedo[x] * by_albedo[x];
-                fringes[x] += by_contrast[x] * by_contrast[x];
-                count[x] = if squares[x] > 0.0 { 1.0 } else { 0.0 };
+    for y in 0..SIDE {
+        let mut sums = [[0.0; LANES]; 4];
+        for at in row(y) {
+            let block = block(derivatives, weights, ratios, at);
+            let (mut squares, mut fringes, mut count) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+            for c in 0..4 {
+                let (by_albedo, by_contrast) =
+                    (derivatives.albedo[c].get(at), derivatives.contrast[c].get(at));
+                for x in 0..LANES {
+                    squares[x] += share * by_albedo[x] * by_albedo[x];
+                    fringes[x] += by_contrast[x] * by_contrast[x];
+                    count[x] = if squares[x] > 0.0 { 1.0 } else { 0.0 };
+                }
             }
+            add(&mut sums, &[block.phase, squares, fringes, count]);
         }
-        phase += total(block.phase);
-        albedo += total(squares);
-        contrast += total(fringes);
-        cells += total(count);
+        phase += total(sums[0]);
+        albedo += total(sums[1]);
+        contrast += total(sums[2]);
+        cells += total(sums[3]);
     }
     let mean = |sum: f64| (sum / cells.max(1.0)) as f32;
     Information { phase: mean(phase), albedo: mean(albedo), contrast: mean(contrast) }

@@ -1,9 +1,10 @@
 //! The data term: residuals of the intensities and their derivatives with respect to the unknowns.
 
-use super::plane::{Plane, total, vectors};
+use super::plane::{Plane, row};
 use super::scales::DataSums;
 use super::tile::Tile;
 use crate::joint::model::weights;
+use crate::joint::params::energy::SIDE;
 use crate::parallel::angle::sin_cos;
 use crate::parallel::exp::exp;
 use crate::parallel::lanes::{LANES, Lanes};
@@ -22,74 +23,68 @@ fn linear<const PAIR: bool>(tile: &mut Tile) -> DataSums {
     let cut = 1.0 / (16.0 * scales.misfit);
     let present = weights(*ratios);
     let mut sums = DataSums::default();
-    for at in vectors() {
-        let (phase, contrast, usable) = (unknown.phase.get(at), unknown.contrast.get(at), usable.get(at));
-        let mut modulation = [0.0; LANES];
-        for x in 0..LANES {
-            modulation[x] = exp(contrast[x]);
+    for y in 0..SIDE {
+        let mut terms = DataSums::default();
+        for at in row(y) {
+            let (phase, contrast, usable) =
+                (unknown.phase.get(at), unknown.contrast.get(at), usable.get(at));
+            let mut modulation = [0.0; LANES];
+            for x in 0..LANES {
+                modulation[x] = exp(contrast[x]);
+            }
+            let mut gradient = Gradient::default();
+            for c in 0..4 {
+                let ratio = ratios[c];
+                let (albedo, light) = (unknown.albedo[c].get(at), light[c].get(at));
+                let cells = Cells { phase, modulation, usable, albedo, light };
+                let kept = scales.channel_contrast[c];
+                let model = if PAIR && c == 3 {
+                    predicted::<_, false, false>(&cells, Line::at(infrared, at), kept, 1.0)
+                } else {
+                    predict(&cells, c, ratio, kept, present[c])
+                };
+                let (whole, by_albedo) = gradient.add(&model, cut, &mut terms, c);
+                derivatives.phase[c].set(at, model.slope);
+                derivatives.albedo[c].set(at, whole);
+                derivatives.contrast[c].set(at, model.fringe);
+                residual.albedo[c].set(at, by_albedo);
+            }
+            for x in 0..LANES {
+                terms.cells[x] += usable[x];
+            }
+            residual.phase.set(at, gradient.by_phase);
+            residual.contrast.set(at, gradient.by_contrast);
         }
-        let mut shared = Shared::default();
-        for c in 0..4 {
-            let ratio = ratios[c];
-            let (albedo, light) = (unknown.albedo[c].get(at), light[c].get(at));
-            let cells = Cells { phase, modulation, usable, albedo, light };
-            let kept = scales.channel_contrast[c];
-            let model = if PAIR && c == 3 {
-                predicted::<_, false, false>(&cells, Line::at(infrared, at), kept, 1.0)
-            } else {
-                predict(&cells, c, ratio, kept, present[c])
-            };
-            let Gradient { whole, by_albedo, cross, power } = shared.add(&model, cut);
-            derivatives.phase[c].set(at, model.slope);
-            derivatives.albedo[c].set(at, whole);
-            derivatives.contrast[c].set(at, model.fringe);
-            residual.albedo[c].set(at, by_albedo);
-            sums.cross[c] += total(cross);
-            sums.power[c] += total(power);
-        }
-        residual.phase.set(at, shared.by_phase);
-        residual.contrast.set(at, shared.by_contrast);
-        sums.squares += total(shared.squares);
-        sums.brightness += total(shared.brightness);
-        sums.cells += total(usable);
+        sums.add(&terms);
     }
     sums
 }
 
-/// Sums over the channels of a vector of cells: gradients, squared residuals and squared offsets.
+/// Negative gradient with respect to phase and contrast of a vector of cells: sums over the channels.
 #[derive(Default)]
-struct Shared {
+struct Gradient {
     by_phase: Lanes,
     by_contrast: Lanes,
-    squares: Lanes,
-    brightness: Lanes,
 }
 
-/// What one channel contributes by itself: its intensity, its gradient, and the terms of its contrast.
-struct Gradient {
-    whole: Lanes,
-    by_albedo: Lanes,
-    cross: Lanes,
-    power: Lanes,
-}
-
-impl Shared {
-    /// Adds one channel.
+impl Gradient {
+    /// Adds channel `c`, also to the sums of the row; returns its intensity and its negative gradient with respect to the albedo.
     #[inline(always)]
-    fn add(&mut self, model: &Model, cut: f32) -> Gradient {
+    fn add(&mut self, model: &Model, cut: f32, sums: &mut DataSums<Lanes>, c: usize) -> (Lanes, Lanes) {
         let Model { offset, fringe, slope, rest } = model;
-        let [mut whole, mut by_albedo, mut cross, mut power] = [[0.0; LANES]; 4];
+        let [mut whole, mut by_albedo] = [[0.0; LANES]; 2];
         for x in 0..LANES {
             whole[x] = offset[x] + fringe[x];
             by_albedo[x] = whole[x] * rest[x];
-            cross[x] = fringe[x] * rest[x];
-            power[x] = fringe[x] * fringe[x];
+            let cross = fringe[x] * rest[x];
+            sums.cross[c][x] += cross;
+            sums.power[c][x] += fringe[x] * fringe[x];
+            sums.squares[x] += rest[x] * rest[x] / (1.0 + rest[x] * rest[x] * cut);
+            sums.brightness[x] += offset[x] * offset[x];
             self.by_phase[x] += slope[x] * rest[x];
-            self.by_contrast[x] += cross[x];
-            self.squares[x] += rest[x] * rest[x] / (1.0 + rest[x] * rest[x] * cut);
-            self.brightness[x] += offset[x] * offset[x];
+            self.by_contrast[x] += cross;
         }
-        Gradient { whole, by_albedo, cross, power }
+        (whole, by_albedo)
     }
 }
 

@@ -1,7 +1,6 @@
 //! Planes of a tile: a square of cells with a rim of zeros, so that no stencil needs to know the border.
 
 use crate::joint::params::energy::SIDE;
-use crate::parallel::Aligned;
 use crate::parallel::lanes::{LANES, Lanes};
 
 /// Rows of zeros above and below the cells of a tile: the reach of the stencils.
@@ -9,18 +8,25 @@ const RIM: usize = 2;
 /// Zeros before the cells of a row; they also follow the cells of the row above. A whole vector, so that no vector of cells lies
 /// across two cache lines.
 const GAP: usize = LANES;
+/// Vectors of cells in a row.
+pub(super) const VECTORS: usize = SIDE / LANES;
 /// Length of a row of a plane.
 pub(super) const STRIDE: usize = SIDE + GAP;
 /// Number of values of a plane.
 const LEN: usize = (SIDE + 2 * RIM) * STRIDE + GAP;
 
-/// One value for every cell of a tile.
+/// One value for every cell of a tile. The length is a constant, so that a vector costs one comparison with its bounds.
 #[derive(Debug)]
-pub(super) struct Plane(Aligned<f32>);
+pub(super) struct Plane(Box<Values>);
+
+/// The values of a plane, from the start of a cache line.
+#[derive(Debug)]
+#[repr(align(64))]
+struct Values([f32; LEN]);
 
 impl Default for Plane {
     fn default() -> Self {
-        Self(Aligned::new(LEN))
+        Self(Box::new(Values([0.0; LEN])))
     }
 }
 
@@ -30,40 +36,47 @@ pub(super) fn place(x: usize, y: usize) -> usize {
     (y + RIM) * STRIDE + x + GAP
 }
 
+/// Positions of the vectors of cells of row `y`. Loops over rows and then over these vectors are unrolled, and the compiler proves
+/// that all positions lie inside.
+#[inline(always)]
+pub(super) fn row(y: usize) -> impl Iterator<Item = usize> {
+    (0..VECTORS).map(move |i| place(i * LANES, y))
+}
+
 /// Positions of all vectors of cells, row by row.
 #[inline(always)]
 pub(super) fn vectors() -> impl Iterator<Item = usize> {
-    (0..SIDE).flat_map(|y| (0..SIDE / LANES).map(move |i| place(i * LANES, y)))
+    (0..SIDE).flat_map(row)
 }
 
 impl Plane {
     /// The vector from a position on, by value.
     #[inline(always)]
     pub fn get(&self, at: usize) -> Lanes {
-        *self.0[at..].first_chunk().expect("a vector lies inside its plane")
+        *self.0.0[at..].first_chunk().expect("a vector lies inside its plane")
     }
 
     #[inline(always)]
     pub fn set(&mut self, at: usize, values: Lanes) {
-        *self.0[at..].first_chunk_mut().expect("a vector lies inside its plane") = values;
+        *self.0.0[at..].first_chunk_mut().expect("a vector lies inside its plane") = values;
     }
 
     pub fn copy(&mut self, from: &Self) {
-        self.0.copy_from_slice(&from.0);
+        self.0.0.copy_from_slice(&from.0.0);
     }
 
     pub fn clear(&mut self) {
-        self.0.fill(0.0);
+        self.0.0.fill(0.0);
     }
 
     /// The cells of row `y`.
     pub fn row(&self, y: usize) -> &[f32] {
-        &self.0[place(0, y)..][..SIDE]
+        &self.0.0[place(0, y)..][..SIDE]
     }
 
     /// The cells of row `y`, to be changed.
     pub fn row_mut(&mut self, y: usize) -> &mut [f32] {
-        &mut self.0[place(0, y)..][..SIDE]
+        &mut self.0.0[place(0, y)..][..SIDE]
     }
 }
 
@@ -98,6 +111,11 @@ pub(super) struct Fields {
 }
 
 impl Fields {
+    /// Makes all values 0.
+    pub fn clear(&mut self) {
+        self.planes_mut().into_iter().for_each(Plane::clear);
+    }
+
     /// The six planes.
     pub fn planes_mut(&mut self) -> [&mut Plane; 6] {
         let [red, green, blue, infrared] = &mut self.albedo;

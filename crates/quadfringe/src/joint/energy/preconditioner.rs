@@ -1,7 +1,7 @@
 //! The preconditioner: exact solutions along the columns of cells.
 
 use super::blocks::{Block, bend_diagonal, block, difference_diagonal};
-use super::plane::{Column, Derivatives, Fields, Plane, STRIDE, Weights, place, total};
+use super::plane::{Derivatives, Fields, Plane, STRIDE, VECTORS, Weights, place, row, total};
 use crate::joint::model::count;
 use crate::joint::params::energy::{CONTRAST_RIDGE, PIVOT_RIDGE, RIDGE, SIDE};
 use crate::parallel::lanes::{LANES, Lanes};
@@ -11,7 +11,7 @@ use multiversion::multiversion;
 /// negative, and the tile would have no phase. What this adds is larger than any rounding.
 const STABLE: f32 = 1.0 + PIVOT_RIDGE;
 
-/// The factors of the matrix, column by column. Columns follow the fringes. Without them, streaks of phase and colour along a
+/// The factors L and D of the matrix M = L D L^T, column by column. Columns follow the fringes. Without them, streaks of phase and colour along a
 /// fringe converge slowly. Within a cell, the albedos answer to phase and contrast, and the contrast to the phase.
 #[derive(Debug, Default)]
 pub(super) struct Preconditioner {
@@ -27,10 +27,9 @@ pub(super) struct Preconditioner {
     /// Factors of the contrast.
     contrast: Plane,
     contrast_first: Plane,
-    /// Inverse pivots of the albedos.
+    /// Factors of the albedos.
     albedo: [Plane; 4],
-    /// Coupling of an albedo with that of the row below, negative.
-    coupling: Plane,
+    albedo_first: [Plane; 4],
 }
 
 /// Factors the matrices of the columns of a tile.
@@ -84,19 +83,19 @@ impl Preconditioner {
     /// Pivots of the albedos.
     #[inline(always)]
     fn albedos(&mut self, weights: &Weights, share: f32, local: &[Lanes; 4], at: usize) {
-        let (bright, colour) = (weights.brightness[1].get(at), weights.colour[1].get(at));
-        let above = self.coupling.get(at - STRIDE);
-        let mut coupling = [0.0; LANES];
+        let (bright, colour) = (weights.brightness[1].get(at - STRIDE), weights.colour[1].get(at - STRIDE));
+        let mut above = [0.0; LANES];
         for x in 0..LANES {
-            coupling[x] = -((1.0 - share) * colour[x] + share * bright[x]);
+            above[x] = -((1.0 - share) * colour[x] + share * bright[x]);
         }
-        self.coupling.set(at, coupling);
         for c in 0..4 {
             let before = self.albedo[c].get(at - STRIDE);
-            let mut inverse = [0.0; LANES];
+            let [mut inverse, mut first] = [[0.0; LANES]; 2];
             for x in 0..LANES {
-                inverse[x] = 1.0 / (STABLE / local[c][x] - above[x] * above[x] * before[x]);
+                first[x] = above[x] * before[x];
+                inverse[x] = 1.0 / (STABLE / local[c][x] - above[x] * first[x]);
             }
+            self.albedo_first[c].set(at, first);
             self.albedo[c].set(at, inverse);
         }
     }
@@ -142,33 +141,56 @@ impl Preconditioner {
     }
 }
 
-/// Solves the columns; returns the scalar product of residual and result.
+/// Goes `length` along a direction whose product with the matrix is given: adds it to the step and takes it from the residual. The
+/// residual is kept as L^-1 r, so the product becomes L^-1 of itself. Returns the squared residual, r M^-1 r.
 ///
-/// Each channel has separate passes. In one pass over all of them the compiler gathers the four channels of a cell into
-/// short vectors, which takes more than twice as long.
+/// Whole rows are eliminated one after the other, so that the columns of a row do not wait for each other. Each channel has a
+/// separate pass over a row. In one pass over all of them the compiler gathers the four channels of a cell into short vectors, which
+/// takes more than twice as long.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-pub(super) fn precondition(lines: &Preconditioner, residual: &Fields, out: &mut Fields) -> f64 {
-    let mut product = 0.0;
-    for x in (0..SIDE).step_by(LANES) {
-        for y in 0..SIDE {
-            let at = place(x, y);
-            out.phase.set(at, residual.phase.get(at));
-            out.contrast.set(at, residual.contrast.get(at));
+pub(super) fn move_along(
+    lines: &Preconditioner,
+    length: f32,
+    direction: &Fields,
+    product: &mut Fields,
+    step: &mut Fields,
+    residual: &mut Fields,
+) -> f64 {
+    let mut size = 0.0;
+    for y in 0..SIDE {
+        lines.eliminate(y, product);
+        let pivots = lines.pivots().into_iter().zip(product.planes());
+        let changed = residual.planes_mut().into_iter().zip(direction.planes().into_iter().zip(step.planes_mut()));
+        let mut squares = [0.0; LANES];
+        for ((pivots, product), (residual, (direction, step))) in pivots.zip(changed) {
+            for at in row(y) {
+                step.set(at, less(step.get(at), [-length; LANES], direction.get(at)));
+                let left = less(residual.get(at), [length; LANES], product.get(at));
+                squares = less(squares, left, less([0.0; LANES], pivots.get(at), left));
+                residual.set(at, left);
+            }
         }
-        for c in 0..4 {
-            lines.eliminate_albedo(c, x, residual, out);
-        }
-        lines.eliminate(x, out);
-        lines.substitute(x, out);
-        for c in 0..4 {
-            lines.substitute_albedo(c, x, out);
-        }
-        for y in (0..SIDE).rev() {
-            let at = place(x, y);
-            product += total(Column::of(out, at).times(&Column::of(residual, at)));
-        }
+        size += total(squares);
     }
-    product
+    size
+}
+
+/// New search direction: M^-1 r plus `share` of the old direction, for a residual that is kept as L^-1 r.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+pub(super) fn turn(lines: &Preconditioner, residual: &Fields, share: f32, direction: &mut Fields) {
+    let mut below = Below::default();
+    for y in (0..SIDE).rev() {
+        lines.substitute(y, residual, share, &mut below, direction);
+    }
+}
+
+/// What the back substitution of a row needs of the rows below: phases of the next and of the one after it, and albedos and contrast
+/// of the next before they follow phase and contrast.
+#[derive(Default)]
+struct Below {
+    phase: [[Lanes; VECTORS]; 2],
+    albedo: [[Lanes; VECTORS]; 4],
+    contrast: [Lanes; VECTORS],
 }
 
 /// `value - factor * by` in every cell.
@@ -181,80 +203,71 @@ fn less(value: Lanes, factor: Lanes, by: Lanes) -> Lanes {
     out
 }
 
+/// The product in every cell.
+#[inline(always)]
+fn times(value: Lanes, factor: Lanes) -> Lanes {
+    let mut out = [0.0; LANES];
+    for x in 0..LANES {
+        out[x] = value[x] * factor[x];
+    }
+    out
+}
+
 impl Preconditioner {
-    /// Forward elimination of the albedos of channel `c`, which changes phase and contrast too.
+    /// Inverse pivots, in the order of the planes of fields.
     #[inline(always)]
-    fn eliminate_albedo(&self, c: usize, x: usize, residual: &Fields, out: &mut Fields) {
-        let mut first = [0.0; LANES];
-        for y in 0..SIDE {
-            let at = place(x, y);
-            let log = residual.albedo[c].get(at);
-            out.phase.set(at, less(out.phase.get(at), self.by_phase[c].get(at), log));
-            out.contrast.set(at, less(out.contrast.get(at), self.by_contrast[c].get(at), log));
-            let (coupling, above) = (self.coupling.get(at - STRIDE), self.albedo[c].get(at - STRIDE));
-            let mut coupled = [0.0; LANES];
-            for i in 0..LANES {
-                coupled[i] = coupling[i] * above[i];
+    fn pivots(&self) -> [&Plane; 6] {
+        let [red, green, blue, infrared] = &self.albedo;
+        [&self.phase, red, green, blue, infrared, &self.contrast]
+    }
+
+    /// Forward elimination of row `y`.
+    #[inline(always)]
+    fn eliminate(&self, y: usize, out: &mut Fields) {
+        let Fields { phase, albedo, contrast } = out;
+        for c in 0..4 {
+            for at in row(y) {
+                let log = albedo[c].get(at);
+                phase.set(at, less(phase.get(at), self.by_phase[c].get(at), log));
+                contrast.set(at, less(contrast.get(at), self.by_contrast[c].get(at), log));
+                albedo[c].set(at, less(log, self.albedo_first[c].get(at), albedo[c].get(at - STRIDE)));
             }
-            first = less(log, coupled, first);
-            out.albedo[c].set(at, first);
+        }
+        for at in row(y) {
+            let slow = contrast.get(at);
+            let mut value = less(phase.get(at), self.contrast_by_phase.get(at), slow);
+            value = less(value, self.phase_first.get(at), phase.get(at - STRIDE));
+            phase.set(at, less(value, self.phase_second.get(at), phase.get(at - 2 * STRIDE)));
+            contrast.set(at, less(slow, self.contrast_first.get(at), contrast.get(at - STRIDE)));
         }
     }
 
-    /// Forward elimination of contrast and phase.
+    /// Back substitution of row `y`; then albedos and contrast follow. The result and `share` of the old direction are the new one.
     #[inline(always)]
-    fn eliminate(&self, x: usize, out: &mut Fields) {
-        let [mut second, mut first, mut slow] = [[0.0; LANES]; 3];
-        for y in 0..SIDE {
-            let at = place(x, y);
-            let (follow, share) = (self.contrast_by_phase.get(at), self.contrast_first.get(at));
-            let (one, two) = (self.phase_first.get(at), self.phase_second.get(at));
-            let (mut phase, contrast) = (out.phase.get(at), out.contrast.get(at));
-            for i in 0..LANES {
-                phase[i] -= follow[i] * contrast[i] + one[i] * first[i] + two[i] * second[i];
-            }
-            slow = less(contrast, share, slow);
-            [second, first] = [first, phase];
-            out.phase.set(at, phase);
-            out.contrast.set(at, slow);
+    fn substitute(&self, y: usize, residual: &Fields, share: f32, below: &mut Below, direction: &mut Fields) {
+        let [mut phases, mut contrasts] = [[[0.0; LANES]; VECTORS]; 2];
+        for (i, at) in row(y).enumerate() {
+            let mut phase = times(residual.phase.get(at), self.phase.get(at));
+            let mut contrast = times(residual.contrast.get(at), self.contrast.get(at));
+            phase = less(phase, self.phase_first.get(at + STRIDE), below.phase[0][i]);
+            phase = less(phase, self.phase_second.get(at + 2 * STRIDE), below.phase[1][i]);
+            contrast = less(contrast, self.contrast_first.get(at + STRIDE), below.contrast[i]);
+            below.contrast[i] = contrast;
+            contrast = less(contrast, self.contrast_by_phase.get(at), phase);
+            (phases[i], contrasts[i]) = (phase, contrast);
+            direction.phase.set(at, less(phase, [-share; LANES], direction.phase.get(at)));
+            direction.contrast.set(at, less(contrast, [-share; LANES], direction.contrast.get(at)));
         }
-    }
-
-    /// Back substitution of contrast and phase; then the contrast follows the phase of its cell.
-    #[inline(always)]
-    fn substitute(&self, x: usize, out: &mut Fields) {
-        let [mut second, mut first, mut slow] = [[0.0; LANES]; 3];
-        for y in (0..SIDE).rev() {
-            let at = place(x, y);
-            let (pivot, inverse) = (self.phase.get(at), self.contrast.get(at));
-            let (one, two) = (self.phase_first.get(at + STRIDE), self.phase_second.get(at + 2 * STRIDE));
-            let share = self.contrast_first.get(at + STRIDE);
-            let (mut phase, mut contrast) = (out.phase.get(at), out.contrast.get(at));
-            for i in 0..LANES {
-                phase[i] = pivot[i] * phase[i] - one[i] * first[i] - two[i] * second[i];
-                contrast[i] = inverse[i] * contrast[i] - share[i] * slow[i];
+        for c in 0..4 {
+            for (i, at) in row(y).enumerate() {
+                let mut log = times(residual.albedo[c].get(at), self.albedo[c].get(at));
+                log = less(log, self.albedo_first[c].get(at + STRIDE), below.albedo[c][i]);
+                below.albedo[c][i] = log;
+                log = less(log, self.by_phase[c].get(at), phases[i]);
+                log = less(log, self.by_contrast[c].get(at), contrasts[i]);
+                direction.albedo[c].set(at, less(log, [-share; LANES], direction.albedo[c].get(at)));
             }
-            [second, first, slow] = [first, phase, contrast];
-            out.phase.set(at, phase);
-            out.contrast.set(at, less(contrast, self.contrast_by_phase.get(at), phase));
         }
-    }
-
-    /// Back substitution of the albedos of channel `c`; then they follow phase and contrast of their cell.
-    #[inline(always)]
-    fn substitute_albedo(&self, c: usize, x: usize, out: &mut Fields) {
-        let mut first = [0.0; LANES];
-        for y in (0..SIDE).rev() {
-            let at = place(x, y);
-            let (inverse, coupling) = (self.albedo[c].get(at), self.coupling.get(at));
-            let (by_phase, by_contrast) = (self.by_phase[c].get(at), self.by_contrast[c].get(at));
-            let (phase, contrast) = (out.phase.get(at), out.contrast.get(at));
-            let (row, mut answer) = (out.albedo[c].get(at), [0.0; LANES]);
-            for i in 0..LANES {
-                first[i] = inverse[i] * (row[i] - coupling[i] * first[i]);
-                answer[i] = first[i] - (by_phase[i] * phase[i] + by_contrast[i] * contrast[i]);
-            }
-            out.albedo[c].set(at, answer);
-        }
+        below.phase = [phases, below.phase[0]];
     }
 }

@@ -1,10 +1,10 @@
 //! The priors: how much neighbouring cells differ in surface, brightness, colour and contrast.
 
-use super::plane::{Column, Plane, STRIDE, total, vectors};
-use super::scales::{PriorSums, unknowns};
+use super::plane::{Column, Plane, STRIDE, row};
+use super::scales::{PriorSums, Sums, unknowns};
 use super::tile::Tile;
 use crate::joint::model::count;
-use crate::joint::params::energy::{BEND_FREEDOM, DIFFERENCE_FREEDOM};
+use crate::joint::params::energy::{BEND_FREEDOM, DIFFERENCE_FREEDOM, SIDE};
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
 
@@ -18,11 +18,15 @@ fn student(freedom: f32, count: f32, square: f32) -> f32 {
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 pub(super) fn weigh(tile: &mut Tile) -> PriorSums {
     let mut sums = PriorSums::default();
-    for at in vectors() {
-        bend(tile, at, &mut sums);
-        for (k, step) in [1, STRIDE].into_iter().enumerate() {
-            differences(tile, at, k, step, &mut sums);
+    for y in 0..SIDE {
+        let mut terms = PriorSums::default();
+        for at in row(y) {
+            bend(tile, at, &mut terms);
+            for (k, step) in [1, STRIDE].into_iter().enumerate() {
+                differences(tile, at, k, step, &mut terms);
+            }
         }
+        sums.add(&terms);
     }
     sums
 }
@@ -62,7 +66,7 @@ pub(super) fn bending(inside: &Plane, phase: &Plane, at: usize) -> Bending {
 }
 
 #[inline(always)]
-fn bend(tile: &mut Tile, at: usize, sums: &mut PriorSums) {
+fn bend(tile: &mut Tile, at: usize, sums: &mut PriorSums<Lanes>) {
     let Tile { inside, unknown, weights, scales, .. } = tile;
     let Bending { along, down, mixed, count, square } = bending(inside, &unknown.phase, at);
     let (noise, inverse) = (scales.noise, 1.0 / scales.bend);
@@ -78,7 +82,7 @@ fn bend(tile: &mut Tile, at: usize, sums: &mut PriorSums) {
     for (plane, out) in weights.bend.iter_mut().zip(out) {
         plane.set(at, out);
     }
-    sums.bend.add(energy, count, mean);
+    sums.bend.add_terms(energy, count, mean);
 }
 
 /// Squared differences of a vector of cells and their neighbours in brightness, colour and contrast. `share` is that of one channel
@@ -104,7 +108,7 @@ pub(super) fn squares(here: &Column, there: &Column, share: f32) -> [Lanes; 3] {
 
 /// Weights of the differences between the cells of a vector and those `step` places further on, in direction `k`.
 #[inline(always)]
-fn differences(tile: &mut Tile, at: usize, k: usize, step: usize, sums: &mut PriorSums) {
+fn differences(tile: &mut Tile, at: usize, k: usize, step: usize, sums: &mut PriorSums<Lanes>) {
     let Tile { inside, unknown, weights, scales, ratios, .. } = tile;
     let (lit, next_lit) = (inside.get(at), inside.get(at + step));
     let channels = count(*ratios);
@@ -126,16 +130,18 @@ fn differences(tile: &mut Tile, at: usize, k: usize, step: usize, sums: &mut Pri
     weights.brightness[k].set(at, out[0]);
     weights.colour[k].set(at, out[1]);
     weights.contrast[k].set(at, out[2]);
-    sums.brightness.add(energy[0], both, mean[0]);
-    sums.colour.add(energy[1], both, mean[1]);
-    sums.contrast.add(energy[2], both, mean[2]);
+    sums.brightness.add_terms(energy[0], both, mean[0]);
+    sums.colour.add_terms(energy[1], both, mean[1]);
+    sums.contrast.add_terms(energy[2], both, mean[2]);
 }
 
-impl super::scales::Sums {
+impl Sums<Lanes> {
     #[inline(always)]
-    fn add(&mut self, energy: Lanes, count: Lanes, mean: Lanes) {
-        self.energy += total(energy);
-        self.count += total(count);
-        self.weight += total(mean);
+    fn add_terms(&mut self, energy: Lanes, count: Lanes, weight: Lanes) {
+        for x in 0..LANES {
+            self.energy[x] += energy[x];
+            self.count[x] += count[x];
+            self.weight[x] += weight[x];
+        }
     }
 }

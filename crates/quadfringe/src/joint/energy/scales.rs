@@ -5,10 +5,12 @@
 //! Computation 4, 415 (1992)). For a field with the information `g` in each cell and a prior of the weight `w`, the share that the
 //! data determine at the spatial frequency k is `g / (g + w |D(k)|^2)`; its mean over all frequencies is the share of the tile.
 
+use super::plane::total;
 use crate::joint::model::{count, weights};
 use crate::joint::params::energy::{
     DETERMINED_MIN, MODEL_SHARE, PRIOR_CELLS, RELAXATION, SCALE_LIMITS, START,
 };
+use crate::parallel::lanes::Lanes;
 use std::ops::RangeInclusive;
 
 /// Variances of noise and priors in one tile.
@@ -46,38 +48,72 @@ impl Default for Scales {
     }
 }
 
-/// Sums over the data of a tile.
+/// Sums over the data of a tile, or of each lane of a row.
 #[derive(Debug, Default)]
-pub(super) struct DataSums {
+pub(super) struct DataSums<T = f64> {
     /// Usable cells.
-    pub cells: f64,
+    pub cells: T,
     /// Squared residuals; large ones count less.
-    pub squares: f64,
+    pub squares: T,
     /// Squared offsets of the channels.
-    pub brightness: f64,
+    pub brightness: T,
     /// Fringes times residuals, and squared fringes, of each channel.
-    pub cross: [f64; 4],
-    pub power: [f64; 4],
+    pub cross: [T; 4],
+    pub power: [T; 4],
+}
+
+impl DataSums {
+    /// Adds the sums of a row.
+    #[inline(always)]
+    pub fn add(&mut self, row: &DataSums<Lanes>) {
+        self.cells += total(row.cells);
+        self.squares += total(row.squares);
+        self.brightness += total(row.brightness);
+        for c in 0..4 {
+            self.cross[c] += total(row.cross[c]);
+            self.power[c] += total(row.power[c]);
+        }
+    }
 }
 
 /// Sums over the differences of one prior.
 #[derive(Debug, Default)]
-pub(super) struct Sums {
+pub(super) struct Sums<T = f64> {
     /// Weighted squared differences.
-    pub energy: f64,
+    pub energy: T,
     /// Number of differences.
-    pub count: f64,
+    pub count: T,
     /// Sum of the weights.
-    pub weight: f64,
+    pub weight: T,
 }
 
-/// Sums over the differences of all priors.
+impl Sums {
+    #[inline(always)]
+    fn add(&mut self, row: &Sums<Lanes>) {
+        self.energy += total(row.energy);
+        self.count += total(row.count);
+        self.weight += total(row.weight);
+    }
+}
+
+/// Sums over the differences of all priors, of a tile or of each lane of a row.
 #[derive(Debug, Default)]
-pub(super) struct PriorSums {
-    pub bend: Sums,
-    pub brightness: Sums,
-    pub colour: Sums,
-    pub contrast: Sums,
+pub(super) struct PriorSums<T = f64> {
+    pub bend: Sums<T>,
+    pub brightness: Sums<T>,
+    pub colour: Sums<T>,
+    pub contrast: Sums<T>,
+}
+
+impl PriorSums {
+    /// Adds the sums of a row.
+    #[inline(always)]
+    pub fn add(&mut self, row: &PriorSums<Lanes>) {
+        self.bend.add(&row.bend);
+        self.brightness.add(&row.brightness);
+        self.colour.add(&row.colour);
+        self.contrast.add(&row.contrast);
+    }
 }
 
 /// Half the number of unknowns for each of them, for a number of channels.

@@ -1,98 +1,53 @@
 //! The linear system of one Gauss-Newton step, solved by preconditioned conjugate gradients.
 
-use super::plane::{Column, Derivatives, Fields, Plane, STRIDE, Weights, four, total, vectors};
-use super::preconditioner::{precondition, prepare};
+use super::plane::{Column, Derivatives, Fields, Plane, STRIDE, Weights, four, row, total, vectors};
+use super::preconditioner::{move_along, prepare, turn};
 use super::tile::Tile;
 use crate::joint::model::{count, weights as channel_weights};
-use crate::joint::params::energy::{CONTRAST_RIDGE, NEGLIGIBLE, RESIDUAL_LEFT, RIDGE};
+use crate::joint::params::energy::{CONTRAST_RIDGE, NEGLIGIBLE, RESIDUAL_LEFT, RIDGE, SIDE};
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
 
 /// Solves the normal equations for the step, starting from the negative gradient in `residual`.
 pub(super) fn solve(tile: &mut Tile, steps: usize) {
     let Tile {
-        unknown,
-        derivatives,
-        weights,
-        preconditioner,
-        residual,
-        preconditioned,
-        direction,
-        product,
-        step,
-        inside,
-        scales,
-        ratios,
-        ..
+        unknown, derivatives, weights, preconditioner, residual, direction, product, step, inside, scales, ratios, ..
     } = tile;
-    // The gradient of the priors.
+    // The gradient of the priors, less the negative gradient of the data.
     multiply::<false>(derivatives, weights, inside, *ratios, unknown, product);
-    subtract(product, residual);
+    subtract(residual, product);
     prepare(preconditioner, derivatives, weights, *ratios);
-    step.planes_mut().into_iter().chain(direction.planes_mut()).for_each(Plane::clear);
+    [&mut *residual, direction, step].into_iter().for_each(Fields::clear);
     let negligible =
         NEGLIGIBLE * f64::from(scales.noise) * vectors().map(|at| total(inside.get(at))).sum::<f64>();
-    let (mut before, mut enough) = (0.0, 0.0);
-    for n in 0..steps {
-        let size = precondition(preconditioner, residual, preconditioned);
-        enough = if n == 0 { negligible.max(RESIDUAL_LEFT * size) } else { enough };
+    let mut size = move_along(preconditioner, 1.0, direction, product, step, residual);
+    let enough = negligible.max(RESIDUAL_LEFT * size);
+    let mut share = 0.0;
+    for _ in 0..steps {
         if size <= enough {
             break;
         }
-        turn(preconditioned, if n == 0 { 0.0 } else { (size / before) as f32 }, direction);
+        turn(preconditioner, residual, share, direction);
         let curvature = multiply::<true>(derivatives, weights, inside, *ratios, direction, product);
         if curvature <= 0.0 {
             break;
         }
-        advance((size / curvature) as f32, direction, product, step, residual);
-        before = size;
+        let before = size;
+        size = move_along(preconditioner, (size / curvature) as f32, direction, product, step, residual);
+        share = (size / before) as f32;
     }
 }
 
-/// Subtracts the product from the residual.
+/// Subtracts fields from others.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn subtract(product: &Fields, residual: &mut Fields) {
-    for (product, residual) in product.planes().into_iter().zip(residual.planes_mut()) {
+fn subtract(fields: &Fields, from: &mut Fields) {
+    for (fields, from) in fields.planes().into_iter().zip(from.planes_mut()) {
         for at in vectors() {
-            let (product, mut out) = (product.get(at), residual.get(at));
+            let (fields, mut out) = (fields.get(at), from.get(at));
             for x in 0..LANES {
-                out[x] -= product[x];
+                out[x] -= fields[x];
             }
-            residual.set(at, out);
-        }
-    }
-}
-
-/// New search direction: the preconditioned residual plus `share` of the old direction.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn turn(preconditioned: &Fields, share: f32, direction: &mut Fields) {
-    for (new, direction) in preconditioned.planes().into_iter().zip(direction.planes_mut()) {
-        for at in vectors() {
-            let (new, mut out) = (new.get(at), direction.get(at));
-            for x in 0..LANES {
-                out[x] = new[x] + share * out[x];
-            }
-            direction.set(at, out);
-        }
-    }
-}
-
-/// Goes `length` along the direction.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn advance(length: f32, direction: &Fields, product: &Fields, step: &mut Fields, residual: &mut Fields) {
-    let from = direction.planes().into_iter().zip(product.planes());
-    for ((direction, product), (step, residual)) in
-        from.zip(step.planes_mut().into_iter().zip(residual.planes_mut()))
-    {
-        for at in vectors() {
-            let (direction, product) = (direction.get(at), product.get(at));
-            let (mut moved, mut left) = (step.get(at), residual.get(at));
-            for x in 0..LANES {
-                moved[x] += length * direction[x];
-                left[x] -= length * product[x];
-            }
-            step.set(at, moved);
-            residual.set(at, left);
+            from.set(at, out);
         }
     }
 }
@@ -110,25 +65,32 @@ pub(super) fn multiply<const DATA: bool>(
 ) -> f64 {
     let (share, present) = (1.0 / count(ratios), channel_weights(ratios));
     let mut product = 0.0;
-    for at in vectors() {
-        let given = Column::of(from, at);
-        let mut found = Column {
-            phase: bend(weights, &from.phase, at),
-            albedo: [[0.0; LANES]; 4],
-            contrast: difference(&weights.contrast, &from.contrast, at),
-        };
-        for (k, edge, there) in
-            [(0, at, at + 1), (0, at - 1, at - 1), (1, at, at + STRIDE), (1, at - STRIDE, at - STRIDE)]
-        {
-            let (bright, colour) = (weights.brightness[k].get(edge), weights.colour[k].get(edge));
-            let between = Between { bright, colour, share, present };
-            colours(&between, &given.albedo, &four(&from.albedo, there), &mut found.albedo);
+    for y in 0..SIDE {
+        let mut squares = [0.0; LANES];
+        for at in row(y) {
+            let given = Column::of(from, at);
+            let mut found = Column {
+                phase: bend(weights, &from.phase, at),
+                albedo: [[0.0; LANES]; 4],
+                contrast: difference(&weights.contrast, &from.contrast, at),
+            };
+            for (k, edge, there) in
+                [(0, at, at + 1), (0, at - 1, at - 1), (1, at, at + STRIDE), (1, at - STRIDE, at - STRIDE)]
+            {
+                let (bright, colour) = (weights.brightness[k].get(edge), weights.colour[k].get(edge));
+                let between = Between { bright, colour, share, present };
+                colours(&between, &given.albedo, &four(&from.albedo, there), &mut found.albedo);
+            }
+            if DATA {
+                add_data(derivatives, inside.get(at), at, &given, &mut found);
+            }
+            let terms = found.times(&given);
+            for x in 0..LANES {
+                squares[x] += terms[x];
+            }
+            found.write(to, at);
         }
-        if DATA {
-            add_data(derivatives, inside.get(at), at, &given, &mut found);
-        }
-        product += total(found.times(&given));
-        found.write(to, at);
+        product += total(squares);
     }
     product
 }

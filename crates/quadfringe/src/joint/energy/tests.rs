@@ -2,7 +2,7 @@
 
 use super::cell_px;
 use super::plane::{Column, Derivatives, Fields, Plane, Weights, place, total, vectors};
-use super::preconditioner::{precondition, prepare};
+use super::preconditioner::{Preconditioner, move_along, prepare, turn};
 use super::priors::weigh;
 use super::restart::continue_through;
 use super::scales::variance_share;
@@ -149,6 +149,14 @@ fn scalar(a: &Fields, b: &Fields) -> f64 {
     vectors().map(|at| total(Column::of(a, at).times(&Column::of(b, at)))).sum()
 }
 
+/// Solves the columns for these fields, which the elimination changes; returns the scalar product of the fields and the solution.
+fn precondition(lines: &Preconditioner, fields: &mut Fields, out: &mut Fields) -> f64 {
+    let [still, mut step, mut residual] = [(); 3].map(|()| Fields::default());
+    let size = move_along(lines, -1.0, &still, fields, &mut step, &mut residual);
+    turn(lines, &residual, 0.0, out);
+    size
+}
+
 #[test]
 fn the_preconditioner_is_symmetric_and_positive() {
     let (mut tile, _) = tile(0.03);
@@ -157,8 +165,9 @@ fn the_preconditioner_is_symmetric_and_positive() {
     prepare(preconditioner, derivatives, weights, RATIOS);
     let (first, second) = (random_fields(1), random_fields(2));
     let [mut one, mut two] = [Fields::default(), Fields::default()];
-    let own = precondition(preconditioner, &first, &mut one);
-    precondition(preconditioner, &second, &mut two);
+    let own = precondition(preconditioner, &mut random_fields(1), &mut one);
+    precondition(preconditioner, &mut random_fields(2), &mut two);
+    assert!((own - scalar(&first, &one)).abs() < 1e-4 * own, "{own}");
     let (forth, back) = (scalar(&second, &one), scalar(&first, &two));
     assert!(own > 0.0 && (forth - back).abs() < 1e-4 * own, "{forth} {back} {own}");
 }
@@ -182,7 +191,7 @@ fn the_preconditioner_inverts_columns_that_stand_alone() {
     let expected = random_fields(3);
     let [mut product, mut found] = [Fields::default(), Fields::default()];
     multiply::<true>(derivatives, weights, inside, RATIOS, &expected, &mut product);
-    precondition(preconditioner, &product, &mut found);
+    precondition(preconditioner, &mut product, &mut found);
     for n in [0, 2, 3, 5] {
         let (found, expected) = (found.planes()[n], expected.planes()[n]);
         for y in 0..SIDE {
@@ -252,9 +261,10 @@ fn a_lone_column_of_cells_without_light_keeps_the_preconditioner_positive() {
     for n in 1..200 {
         tile.scales.noise = 1e-4 * n as f32;
         weigh(&mut tile);
+        tile.residual.clear();
         tile.residual.planes_mut().into_iter().for_each(|plane| plane.row_mut(40).fill(1.0));
         prepare(&mut tile.preconditioner, &tile.derivatives, &tile.weights, RATIOS);
-        let size = precondition(&tile.preconditioner, &tile.residual, &mut tile.preconditioned);
+        let size = precondition(&tile.preconditioner, &mut tile.residual, &mut tile.step);
         assert!(size.is_finite() && size > 0.0, "{n}: {size}");
     }
 }

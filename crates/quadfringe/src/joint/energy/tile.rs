@@ -56,9 +56,8 @@ pub(super) struct Tile {
     pub derivatives: Derivatives,
     pub weights: Weights,
     pub preconditioner: Preconditioner,
-    /// Negative gradient, then what of it a step leaves.
+    /// Negative gradient of the data term; then, while a step is solved, what of the gradient the step leaves, as L^-1 of it.
     pub residual: Fields,
-    pub preconditioned: Fields,
     pub direction: Fields,
     pub product: Fields,
     pub step: Fields,
