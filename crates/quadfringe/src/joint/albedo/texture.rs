@@ -87,7 +87,8 @@ pub(super) fn take_texture(row: &mut Row, channels: Change, noise: f32, blocks: 
             change[x] = variance * cross[x] / (noise + variance * power[x]);
         }
         for c in channels.channels() {
-            let mut rows = [&mut row.albedo[c], &mut row.signal[c], &mut row.rest[c]].map(|row| lanes_mut(row));
+            let mut rows =
+                [&mut row.albedo[c], &mut row.signal[c], &mut row.rest[c]].map(|row| lanes_mut(row));
             let [mut albedo, mut signal, mut rest] = rows.each_ref().map(|row| row[at]);
             for x in 0..LANES {
                 let added = change[x] * signal[x];

@@ -26,8 +26,7 @@ fn linear<const PAIR: bool>(tile: &mut Tile) -> DataSums {
     for y in 0..SIDE {
         let mut terms = DataSums::default();
         for at in row(y) {
-            let (phase, contrast, usable) =
-                (unknown.phase.get(at), unknown.contrast.get(at), usable.get(at));
+            let (phase, contrast, usable) = (unknown.phase.get(at), unknown.contrast.get(at), usable.get(at));
             let mut modulation = [0.0; LANES];
             for x in 0..LANES {
                 modulation[x] = exp(contrast[x]);

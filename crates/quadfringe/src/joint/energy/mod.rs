@@ -67,7 +67,8 @@ impl Energy {
         let across = columns.origins.len();
         tiles.resize_with(rows.origins.len() * across, Found::default);
         let variance = (prior.noise / factor as f32).powi(2);
-        tiles.par_iter_mut().enumerate().for_each_init(
+        // Tiles with texture take several times as long as others, so threads share them one by one.
+        tiles.par_iter_mut().with_max_len(1).enumerate().for_each_init(
             || slots.take(),
             |tile, (n, found)| {
                 found.inside.clear();

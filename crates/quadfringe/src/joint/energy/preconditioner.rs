@@ -160,7 +160,8 @@ pub(super) fn move_along(
     for y in 0..SIDE {
         lines.eliminate(y, product);
         let pivots = lines.pivots().into_iter().zip(product.planes());
-        let changed = residual.planes_mut().into_iter().zip(direction.planes().into_iter().zip(step.planes_mut()));
+        let changed =
+            residual.planes_mut().into_iter().zip(direction.planes().into_iter().zip(step.planes_mut()));
         let mut squares = [0.0; LANES];
         for ((pivots, product), (residual, (direction, step))) in pivots.zip(changed) {
             for at in row(y) {

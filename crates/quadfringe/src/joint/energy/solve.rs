@@ -11,7 +11,18 @@ use multiversion::multiversion;
 /// Solves the normal equations for the step, starting from the negative gradient in `residual`.
 pub(super) fn solve(tile: &mut Tile, steps: usize) {
     let Tile {
-        unknown, derivatives, weights, preconditioner, residual, direction, product, step, inside, scales, ratios, ..
+        unknown,
+        derivatives,
+        weights,
+        preconditioner,
+        residual,
+        direction,
+        product,
+        step,
+        inside,
+        scales,
+        ratios,
+        ..
     } = tile;
     // The gradient of the priors, less the negative gradient of the data.
     multiply::<false>(derivatives, weights, inside, *ratios, unknown, product);

@@ -6,7 +6,7 @@ use super::tile::Tile;
 use crate::joint::model::{count, weights};
 use crate::joint::params::energy::{ALBEDO_LIMITS, CONTRAST_START_LIMITS, START_ROUNDS};
 use crate::parallel::angle::sin_cos;
-use crate::parallel::exp::exp;
+use crate::parallel::exp::{exp, ln};
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
 
@@ -33,10 +33,10 @@ pub(super) fn contrast_and_albedo(tile: &mut Tile, share: f32) {
         }
     }
     // The logarithm of the contrast of a channel that is absent is 0.
-    let mean = (contrast.iter().map(|value| value.ln()).sum::<f32>() / count(tile.ratios)).exp();
-    tile.scales.channel_contrast = contrast.map(|value| value / mean);
+    let mean = contrast.iter().map(|value| value.ln()).sum::<f32>() / count(tile.ratios);
+    tile.scales.channel_contrast = contrast.map(|value| value / mean.exp());
     for at in vectors() {
-        tile.unknown.contrast.set(at, tile.inside.get(at).map(|inside| inside * mean.ln()));
+        tile.unknown.contrast.set(at, tile.inside.get(at).map(|inside| inside * mean));
     }
 }
 
@@ -103,7 +103,7 @@ fn albedo(tile: &mut Tile, channel: usize, contrast: f32, share: f32) {
         let mut out = [0.0; LANES];
         for x in 0..LANES {
             let albedo = over[x] / (under[x] + 1e-3);
-            out[x] = inside[x] * albedo.clamp(ALBEDO_LIMITS[0], ALBEDO_LIMITS[1]).ln();
+            out[x] = inside[x] * ln(albedo.clamp(ALBEDO_LIMITS[0], ALBEDO_LIMITS[1]));
         }
         unknown.albedo[channel].set(at, out);
     }
