@@ -42,7 +42,7 @@ fn linear<const PAIR: bool>(tile: &mut Tile) -> DataSums {
                 } else {
                     predict(&cells, c, ratio, kept, present[c])
                 };
-                let (whole, by_albedo) = gradient.add(&model, cut, &mut terms, c);
+                let Contribution { whole, by_albedo } = gradient.add(&model, cut, &mut terms, c);
                 derivatives.phase[c].set(at, model.slope);
                 derivatives.albedo[c].set(at, whole);
                 derivatives.contrast[c].set(at, model.fringe);
@@ -66,10 +66,16 @@ struct Gradient {
     by_contrast: Lanes,
 }
 
+/// What one channel contributes by itself: its intensity, and its negative gradient with respect to the albedo.
+struct Contribution {
+    whole: Lanes,
+    by_albedo: Lanes,
+}
+
 impl Gradient {
-    /// Adds channel `c`, also to the sums of the row; returns its intensity and its negative gradient with respect to the albedo.
+    /// Adds channel `c`, also to the sums of the row.
     #[inline(always)]
-    fn add(&mut self, model: &Model, cut: f32, sums: &mut DataSums<Lanes>, c: usize) -> (Lanes, Lanes) {
+    fn add(&mut self, model: &Model, cut: f32, sums: &mut DataSums<Lanes>, c: usize) -> Contribution {
         let Model { offset, fringe, slope, rest } = model;
         let [mut whole, mut by_albedo] = [[0.0; LANES]; 2];
         for x in 0..LANES {
@@ -83,7 +89,7 @@ impl Gradient {
             self.by_phase[x] += slope[x] * rest[x];
             self.by_contrast[x] += cross;
         }
-        (whole, by_albedo)
+        Contribution { whole, by_albedo }
     }
 }
 

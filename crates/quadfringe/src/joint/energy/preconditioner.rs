@@ -27,9 +27,9 @@ pub(super) struct Preconditioner {
     /// Factors of the contrast.
     contrast: Plane,
     contrast_first: Plane,
-    /// Factors of the albedos.
+    /// Inverse pivots of the albedos, and the coupling of each of them with that of the row below, negative.
     albedo: [Plane; 4],
-    albedo_first: [Plane; 4],
+    coupling: Plane,
 }
 
 /// Factors the matrices of the columns of a tile.
@@ -83,19 +83,19 @@ impl Preconditioner {
     /// Pivots of the albedos.
     #[inline(always)]
     fn albedos(&mut self, weights: &Weights, share: f32, local: &[Lanes; 4], at: usize) {
-        let (bright, colour) = (weights.brightness[1].get(at - STRIDE), weights.colour[1].get(at - STRIDE));
-        let mut above = [0.0; LANES];
+        let (bright, colour) = (weights.brightness[1].get(at), weights.colour[1].get(at));
+        let above = self.coupling.get(at - STRIDE);
+        let mut coupling = [0.0; LANES];
         for x in 0..LANES {
-            above[x] = -((1.0 - share) * colour[x] + share * bright[x]);
+            coupling[x] = -((1.0 - share) * colour[x] + share * bright[x]);
         }
+        self.coupling.set(at, coupling);
         for c in 0..4 {
             let before = self.albedo[c].get(at - STRIDE);
-            let [mut inverse, mut first] = [[0.0; LANES]; 2];
+            let mut inverse = [0.0; LANES];
             for x in 0..LANES {
-                first[x] = above[x] * before[x];
-                inverse[x] = 1.0 / (STABLE / local[c][x] - above[x] * first[x]);
+                inverse[x] = 1.0 / (STABLE / local[c][x] - above[x] * above[x] * before[x]);
             }
-            self.albedo_first[c].set(at, first);
             self.albedo[c].set(at, inverse);
         }
     }
@@ -231,7 +231,8 @@ impl Preconditioner {
                 let log = albedo[c].get(at);
                 phase.set(at, less(phase.get(at), self.by_phase[c].get(at), log));
                 contrast.set(at, less(contrast.get(at), self.by_contrast[c].get(at), log));
-                albedo[c].set(at, less(log, self.albedo_first[c].get(at), albedo[c].get(at - STRIDE)));
+                let first = times(self.coupling.get(at - STRIDE), self.albedo[c].get(at - STRIDE));
+                albedo[c].set(at, less(log, first, albedo[c].get(at - STRIDE)));
             }
         }
         for at in row(y) {
@@ -261,8 +262,8 @@ impl Preconditioner {
         }
         for c in 0..4 {
             for (i, at) in row(y).enumerate() {
-                let mut log = times(residual.albedo[c].get(at), self.albedo[c].get(at));
-                log = less(log, self.albedo_first[c].get(at + STRIDE), below.albedo[c][i]);
+                let log = less(residual.albedo[c].get(at), self.coupling.get(at), below.albedo[c][i]);
+                let mut log = times(log, self.albedo[c].get(at));
                 below.albedo[c][i] = log;
                 log = less(log, self.by_phase[c].get(at), phases[i]);
                 log = less(log, self.by_contrast[c].get(at), contrasts[i]);

@@ -28,35 +28,38 @@ impl Tile {
         if !self.compared {
             return;
         }
-        for (to, from) in self.first.planes_mut().into_iter().zip(self.unknown.planes()) {
+        // White surfaces never take this memory.
+        let mut kept = self.first.take().unwrap_or_default();
+        for (to, from) in kept.planes_mut().into_iter().zip(self.unknown.planes()) {
             to.copy(from);
         }
-        let differs = self.bridge();
+        let differs = self.bridge(&kept);
         let Self { inside, torn, lit, product, .. } = self;
         continue_through(inside, torn, lit, [&mut product.phase, &mut product.contrast]);
         if differs {
-            self.start_again(noise);
+            self.start_again(&mut kept, noise);
         }
-        let mixed = self.start_again(noise);
+        let mixed = self.start_again(&mut kept, noise);
         let scales = self.scales;
-        if mixed && excess(self, &scales, &[scales]) < 0.0 {
-            std::mem::swap(&mut self.unknown, &mut self.first);
+        if mixed && excess(self, &kept, &scales, &[scales]) < 0.0 {
+            std::mem::swap(&mut self.unknown, &mut kept);
         }
+        self.first = Some(kept);
     }
 
     /// Minimises from the present phase, and keeps the lower minimum as in `keep_lower`.
-    fn start_again(&mut self, noise: f32) -> bool {
-        let kept = self.scales;
-        self.scales = Scales { noise, misfit: 1.0, bend: SCALE_LIMITS[0].powi(2), ..kept };
+    fn start_again(&mut self, kept: &mut Fields, noise: f32) -> bool {
+        let scales = self.scales;
+        self.scales = Scales { noise, misfit: 1.0, bend: SCALE_LIMITS[0].powi(2), ..scales };
         contrast_and_albedo(self, SURROUNDINGS_SHARE);
         self.descend(noise, self.scales.bend, 1);
-        keep_lower(self, &kept)
+        keep_lower(self, kept, &scales)
     }
 
     /// Moves the phase to the surface that bends least through the cells without texture, around the cells where it differs; gives
     /// whether there are any.
-    fn bridge(&mut self) -> bool {
-        let Self { inside, lit, first, derivatives, weights, residual, ratios, scales, .. } = self;
+    fn bridge(&mut self, first: &Fields) -> bool {
+        let Self { inside, lit, derivatives, weights, residual, ratios, scales, .. } = self;
         lit.copy(inside);
         hold_by_phase(inside, *ratios, first, scales.noise, derivatives);
         bend_everywhere(scales.noise / scales.bend, weights);
@@ -197,30 +200,30 @@ fn farther(one: Lanes, other: Lanes, lit: Lanes) -> Lanes {
     out
 }
 
-/// Keeps the lower of two minima: the kept one, with the scales `kept`, and the present one. The present unknowns become a mixture: the
+/// Keeps the lower of two minima: the kept one, with the given scales, and the present one. The present unknowns become a mixture: the
 /// lower minimum, with the cells of the other one around which that has a much lower energy. Gives whether there are such cells.
-fn keep_lower(tile: &mut Tile, kept: &Scales) -> bool {
+fn keep_lower(tile: &mut Tile, kept: &mut Fields, scales: &Scales) -> bool {
     let found = tile.scales;
     let mut sign = 1.0;
-    if excess(tile, kept, &[*kept, found]) > 0.0 {
-        std::mem::swap(&mut tile.unknown, &mut tile.first);
+    if excess(tile, kept, scales, &[*scales, found]) > 0.0 {
+        std::mem::swap(&mut tile.unknown, kept);
         sign = -1.0;
     } else {
-        tile.scales = *kept;
+        tile.scales = *scales;
     }
-    mix_minima(tile, sign)
+    mix_minima(tile, kept, sign)
 }
 
 /// Writes the energy of the kept unknowns less that of the present ones into the first plane of the product, and gives its sum. Both
-/// have the contrasts of the channels that belong to them, the kept ones those of `kept`. The energies are sums over all `scales`.
-fn excess(tile: &mut Tile, kept: &Scales, scales: &[Scales]) -> f64 {
+/// have the contrasts of the channels that belong to them, the kept ones those of `kept_scales`. The energies are sums over all `scales`.
+fn excess(tile: &mut Tile, kept: &Fields, kept_scales: &Scales, scales: &[Scales]) -> f64 {
     let Tile { light, usable, inside, lit: continued, ratios, pair, infrared, .. } = tile;
     let given = Given { light, usable, inside, continued, ratios: *ratios, pair: *pair, infrared };
     let excess = &mut tile.product.phase;
     excess.clear();
     for scales in scales {
         let of = |owner: &Scales| Scales { channel_contrast: owner.channel_contrast, ..*scales };
-        add_energy(1.0, &given, &tile.first, &of(kept), excess);
+        add_energy(1.0, &given, kept, &of(kept_scales), excess);
         add_energy(-1.0, &given, &tile.unknown, &of(&tile.scales), excess);
     }
     vectors().map(|at| total(excess.get(at))).sum()
@@ -230,11 +233,11 @@ fn excess(tile: &mut Tile, kept: &Scales, scales: &[Scales]) -> f64 {
 /// there are any. Adds to the spread where neither energy is much lower. The excess of the kept ones stands in the first plane of the
 /// product, times `sign`.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn mix_minima(tile: &mut Tile, sign: f32) -> bool {
-    let Tile { inside, unknown, first, product, spread, .. } = tile;
+fn mix_minima(tile: &mut Tile, kept: &Fields, sign: f32) -> bool {
+    let Tile { inside, unknown, product, spread, .. } = tile;
     let [excess, around, spare, ..] = product.planes_mut();
     for at in vectors() {
-        around.set(at, farther(first.phase.get(at), unknown.phase.get(at), inside.get(at)));
+        around.set(at, farther(kept.phase.get(at), unknown.phase.get(at), inside.get(at)));
     }
     filter(around, spare, THREE);
     for at in vectors() {
@@ -245,7 +248,7 @@ fn mix_minima(tile: &mut Tile, sign: f32) -> bool {
         excess.set(at, counted);
     }
     filter(excess, spare, FIVE);
-    add_spread(excess, [&first.phase, &unknown.phase], spread);
+    add_spread(excess, [&kept.phase, &unknown.phase], spread);
     let mut mixed = 0.0;
     for at in vectors() {
         let (excess, mut around) = (excess.get(at), around.get(at));
@@ -255,7 +258,7 @@ fn mix_minima(tile: &mut Tile, sign: f32) -> bool {
         mixed += total(around);
         spare.set(at, around);
     }
-    for (kept, unknown) in first.planes().into_iter().zip(unknown.planes_mut()) {
+    for (kept, unknown) in kept.planes().into_iter().zip(unknown.planes_mut()) {
         for at in vectors() {
             let (other, kept, mut out) = (spare.get(at), kept.get(at), unknown.get(at));
             for x in 0..LANES {

@@ -45,8 +45,8 @@ pub(super) struct Tile {
     /// Variance of the second differences of the phase that the shot suggests, whatever `detail` is, rad^2.
     pub bend: f32,
     pub unknown: Fields,
-    /// Unknowns of the lowest minimum so far, while there is another start.
-    pub first: Fields,
+    /// Memory for the unknowns of the lowest minimum so far, once a tile has had another start.
+    pub first: Option<Fields>,
     /// Lit cells while the surface is bridged; then cells through which it continues in a comparison.
     pub lit: Plane,
     /// Whether minima have been compared.
