@@ -11,8 +11,8 @@ use multiversion::multiversion;
 /// negative, and the tile would have no phase. What this adds is larger than any rounding.
 const STABLE: f32 = 1.0 + PIVOT_RIDGE;
 
-/// The factors L and D of the matrix M = L D L^T, column by column. Columns follow the fringes. Without them, streaks of phase and colour along a
-/// fringe converge slowly. Within a cell, the albedos answer to phase and contrast, and the contrast to the phase.
+/// The factors of the matrix M = L D L^T, column by column. Columns follow the fringes. Without them, streaks of phase and colour
+/// along a fringe converge slowly. Within a cell, the albedos answer to phase and contrast, and the contrast to the phase.
 #[derive(Debug, Default)]
 pub(super) struct Preconditioner {
     /// Change of each logarithm of an albedo that balances a unit change of the phase or the contrast of its cell, negative.
@@ -165,9 +165,9 @@ pub(super) fn move_along(
         let mut squares = [0.0; LANES];
         for ((pivots, product), (residual, (direction, step))) in pivots.zip(changed) {
             for at in row(y) {
-                step.set(at, less(step.get(at), [-length; LANES], direction.get(at)));
+                step.set(at, plus(step.get(at), [length; LANES], direction.get(at)));
                 let left = less(residual.get(at), [length; LANES], product.get(at));
-                squares = less(squares, left, less([0.0; LANES], pivots.get(at), left));
+                squares = plus(squares, left, times(pivots.get(at), left));
                 residual.set(at, left);
             }
         }
@@ -200,6 +200,16 @@ fn less(value: Lanes, factor: Lanes, by: Lanes) -> Lanes {
     let mut out = [0.0; LANES];
     for x in 0..LANES {
         out[x] = value[x] - factor[x] * by[x];
+    }
+    out
+}
+
+/// `value + factor * by` in every cell.
+#[inline(always)]
+fn plus(value: Lanes, factor: Lanes, by: Lanes) -> Lanes {
+    let mut out = [0.0; LANES];
+    for x in 0..LANES {
+        out[x] = value[x] + factor[x] * by[x];
     }
     out
 }
@@ -257,8 +267,8 @@ impl Preconditioner {
             below.contrast[i] = contrast;
             contrast = less(contrast, self.contrast_by_phase.get(at), phase);
             (phases[i], contrasts[i]) = (phase, contrast);
-            direction.phase.set(at, less(phase, [-share; LANES], direction.phase.get(at)));
-            direction.contrast.set(at, less(contrast, [-share; LANES], direction.contrast.get(at)));
+            direction.phase.set(at, plus(phase, [share; LANES], direction.phase.get(at)));
+            direction.contrast.set(at, plus(contrast, [share; LANES], direction.contrast.get(at)));
         }
         for c in 0..4 {
             for (i, at) in row(y).enumerate() {
@@ -267,7 +277,7 @@ impl Preconditioner {
                 below.albedo[c][i] = log;
                 log = less(log, self.by_phase[c].get(at), phases[i]);
                 log = less(log, self.by_contrast[c].get(at), contrasts[i]);
-                direction.albedo[c].set(at, less(log, [-share; LANES], direction.albedo[c].get(at)));
+                direction.albedo[c].set(at, plus(log, [share; LANES], direction.albedo[c].get(at)));
             }
         }
         below.phase = [phases, below.phase[0]];
