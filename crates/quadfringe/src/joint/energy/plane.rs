@@ -36,8 +36,8 @@ pub(super) fn place(x: usize, y: usize) -> usize {
     (y + RIM) * STRIDE + x + GAP
 }
 
-/// Positions of the vectors of cells of row `y`. Loops over rows and then over these vectors are unrolled, and the compiler proves
-/// that all positions lie inside.
+/// Positions of the vectors of cells of row `y`. In nested loops over rows and these vectors, the compiler can leave out most
+/// comparisons with the bounds.
 #[inline(always)]
 pub(super) fn row(y: usize) -> impl Iterator<Item = usize> {
     (0..VECTORS).map(move |i| place(i * LANES, y))

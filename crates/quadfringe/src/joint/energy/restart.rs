@@ -47,7 +47,7 @@ impl Tile {
         self.first = Some(kept);
     }
 
-    /// Minimises from the present phase, and keeps the lower minimum as in `keep_lower`.
+    /// Minimises from the present phase, and keeps the lower of the minimum found and the kept one, as in `keep_lower`.
     fn start_again(&mut self, kept: &mut Fields, noise: f32) -> bool {
         let scales = self.scales;
         self.scales = Scales { noise, misfit: 1.0, bend: SCALE_LIMITS[0].powi(2), ..scales };
@@ -63,7 +63,7 @@ impl Tile {
         lit.copy(inside);
         hold_by_phase(inside, *ratios, first, scales.noise, derivatives);
         bend_everywhere(scales.noise / scales.bend, weights);
-        residual.planes_mut().into_iter().for_each(Plane::clear);
+        residual.clear();
         // The surface continues through cells without light.
         vectors().for_each(|at| inside.set(at, [1.0; LANES]));
         solve(self, INNER_STEPS);
