@@ -71,14 +71,13 @@ impl Tile {
             let sums = linearise(self);
             let most = if limited { self.scales.misfit } else { f32::INFINITY };
             self.scales.estimate_noise(&sums, self.ratios, noise..=most);
-            let sums = weigh(self);
             if outer > 0 {
-                let channels = count(self.ratios);
-                let information = information(&self.derivatives, &self.weights, self.ratios);
+                self.information = information(&self.derivatives, &self.weights, self.ratios);
+                let sums = weigh(self);
                 bend_max *= BEND_GROWTH * BEND_GROWTH;
-                self.scales.estimate_priors(&sums, information, channels, bend_max);
-                weigh(self);
+                self.scales.estimate_priors(&sums, self.information, count(self.ratios), bend_max);
             }
+            weigh(self);
             solve(self, INNER_STEPS);
             let moved = self.advance();
             debug_assert!(moved.is_finite(), "a step of a tile is not finite");
