@@ -5,14 +5,12 @@ use super::data::linearise;
 use super::plane::{Column, vectors};
 use super::priors::weigh;
 use super::scales::{Determined, Scales};
-use super::solve::solve;
+use super::solve::{Effort, solve};
 use super::start::contrast_and_albedo;
 use super::tile::{Found, Tile};
 use super::variance::variance;
 use crate::joint::model::{absent, count};
-use crate::joint::params::energy::{
-    BEND_GROWTH, DETAIL_STEPS, INNER_STEPS, OUTER_STEPS, RESTING_RAD, SIDE, STEP_MAX,
-};
+use crate::joint::params::energy::{BEND_GROWTH, DETAIL_STEPS, OUTER_STEPS, RESTING_RAD, SIDE, STEP_MAX};
 use crate::parallel::exp::exp;
 use crate::parallel::lanes::{LANES, Lanes};
 
@@ -39,7 +37,7 @@ impl Tile {
         self.unknown.phase.copy(&self.start);
         self.spread.clear();
         contrast_and_albedo(self, 1.0);
-        self.descend(noise, self.scales.bend, OUTER_STEPS);
+        self.descend(noise, self.scales.bend, OUTER_STEPS, Effort::usual());
         self.restart(noise);
         let sums = linearise(self);
         self.scales.estimate_noise(&sums, self.ratios, noise..=f32::INFINITY);
@@ -55,7 +53,7 @@ impl Tile {
         self.scales.bend *= detail.powi(4);
         for _ in 0..DETAIL_STEPS {
             weigh(self);
-            solve(self, INNER_STEPS);
+            solve(self, Effort::usual());
             self.advance();
             linearise(self);
         }
@@ -63,25 +61,27 @@ impl Tile {
 
     /// Lowers the energy from the present unknowns, and estimates the scales. `noise` is the least variance of the noise, and `bend_max`
     /// the greatest variance of the bending in the first step; it grows from step to step (J43). While it limits the surface, the noise
-    /// may not rise, or it would explain what the surface may not. At most `steps` follow in which it does not.
-    pub(super) fn descend(&mut self, noise: f32, mut bend_max: f32, steps: usize) {
+    /// may not rise, or it would explain what the surface may not, and each step takes this `effort`. At most `steps` follow in which it does
+    /// not.
+    pub(super) fn descend(&mut self, noise: f32, mut bend_max: f32, steps: usize, effort: Effort) {
         self.scales.determined = Determined::default();
         let (mut outer, mut free, mut limited) = (0, 0, false);
         while free < steps {
             let sums = linearise(self);
             let most = if limited { self.scales.misfit } else { f32::INFINITY };
             self.scales.estimate_noise(&sums, self.ratios, noise..=most);
+            let sums = weigh(self);
             if outer > 0 {
-                self.information = information(&self.derivatives, &self.weights, self.ratios);
-                let sums = weigh(self);
+                let channels = count(self.ratios);
+                let information = information(&self.derivatives, &self.weights, self.ratios);
                 bend_max *= BEND_GROWTH * BEND_GROWTH;
-                self.scales.estimate_priors(&sums, self.information, count(self.ratios), bend_max);
+                self.scales.estimate_priors(&sums, information, channels, bend_max);
+                weigh(self);
             }
-            weigh(self);
-            solve(self, INNER_STEPS);
+            limited = self.scales.bend >= bend_max;
+            solve(self, if limited { effort } else { Effort::usual() });
             let moved = self.advance();
             debug_assert!(moved.is_finite(), "a step of a tile is not finite");
-            limited = self.scales.bend >= bend_max;
             free += usize::from(!limited);
             if outer > 1 && !limited && moved < RESTING_RAD {
                 break;

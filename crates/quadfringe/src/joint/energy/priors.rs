@@ -1,7 +1,7 @@
 //! The priors: how much neighbouring cells differ in surface, brightness, colour and contrast.
 
 use super::plane::{Column, Plane, STRIDE, row};
-use super::scales::{PriorSums, Sums, difference_share, unknowns};
+use super::scales::{PriorSums, Sums, unknowns};
 use super::tile::Tile;
 use crate::joint::model::count;
 use crate::joint::params::energy::{BEND_FREEDOM, DIFFERENCE_FREEDOM, SIDE};
@@ -17,14 +17,13 @@ fn student(freedom: f32, count: f32, square: f32) -> f32 {
 /// Sets all weights from the differences of the unknowns, and returns the sums from which the scales are estimated.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 pub(super) fn weigh(tile: &mut Tile) -> PriorSums {
-    let relative = tile.scales.relative_weights(tile.information);
     let mut sums = PriorSums::default();
     for y in 0..SIDE {
         let mut terms = PriorSums::default();
         for at in row(y) {
             bend(tile, at, &mut terms);
             for (k, step) in [1, STRIDE].into_iter().enumerate() {
-                differences(tile, at, k, step, relative, &mut terms);
+                differences(tile, at, k, step, &mut terms);
             }
         }
         sums.add(&terms);
@@ -72,18 +71,18 @@ fn bend(tile: &mut Tile, at: usize, sums: &mut PriorSums<Lanes>) {
     let Bending { along, down, mixed, count, square } = bending(inside, &unknown.phase, at);
     let (noise, inverse) = (scales.noise, 1.0 / scales.bend);
     let mut out = [[0.0; LANES]; 3];
-    let mut energy = [0.0; LANES];
+    let [mut energy, mut mean] = [[0.0; LANES]; 2];
     for x in 0..LANES {
         let student = student(BEND_FREEDOM, count[x], square[x] * inverse);
         energy[x] = student * square[x];
-        sums.bend_weight[x] += count[x] * student;
+        mean[x] = count[x] * student;
         let weight = student * inverse * noise;
         (out[0][x], out[1][x], out[2][x]) = (along[x] * weight, down[x] * weight, 2.0 * mixed[x] * weight);
     }
     for (plane, out) in weights.bend.iter_mut().zip(out) {
         plane.set(at, out);
     }
-    sums.bend.add_terms(energy, count);
+    sums.bend.add_terms(energy, count, mean);
 }
 
 /// Squared differences of a vector of cells and their neighbours in brightness, colour and contrast. `share` is that of one channel
@@ -107,17 +106,9 @@ pub(super) fn squares(here: &Column, there: &Column, share: f32) -> [Lanes; 3] {
     out
 }
 
-/// Weights of the differences between the cells of a vector and those `step` places further on, in direction `k`. `relative` are the
-/// weights relative to the information of a cell, where Student's t has a weight of 1.
+/// Weights of the differences between the cells of a vector and those `step` places further on, in direction `k`.
 #[inline(always)]
-fn differences(
-    tile: &mut Tile,
-    at: usize,
-    k: usize,
-    step: usize,
-    relative: [f32; 3],
-    sums: &mut PriorSums<Lanes>,
-) {
+fn differences(tile: &mut Tile, at: usize, k: usize, step: usize, sums: &mut PriorSums<Lanes>) {
     let Tile { inside, unknown, weights, scales, ratios, .. } = tile;
     let (lit, next_lit) = (inside.get(at), inside.get(at + step));
     let channels = count(*ratios);
@@ -125,31 +116,32 @@ fn differences(
     let squares = squares(&Column::of(unknown, at), &Column::of(unknown, at + step), share);
     let noise = scales.noise;
     let inverse = [1.0 / scales.brightness, 1.0 / scales.colour, 1.0 / scales.contrast];
-    let [mut out, mut energy] = [[[0.0; LANES]; 3]; 2];
+    let (mut out, mut energy, mut mean) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3], [[0.0; LANES]; 3]);
     let mut both: Lanes = [0.0; LANES];
     for x in 0..LANES {
         both[x] = lit[x] * next_lit[x];
         for n in 0..3 {
             let student = both[x] * student(DIFFERENCE_FREEDOM, unknowns[n], squares[n][x] * inverse[n]);
             energy[n][x] = student * squares[n][x];
-            sums.determined[n][x] += both[x] * difference_share(relative[n] * student);
+            mean[n][x] = student;
             out[n][x] = student * inverse[n] * noise;
         }
     }
     weights.brightness[k].set(at, out[0]);
     weights.colour[k].set(at, out[1]);
     weights.contrast[k].set(at, out[2]);
-    sums.brightness.add_terms(energy[0], both);
-    sums.colour.add_terms(energy[1], both);
-    sums.contrast.add_terms(energy[2], both);
+    sums.brightness.add_terms(energy[0], both, mean[0]);
+    sums.colour.add_terms(energy[1], both, mean[1]);
+    sums.contrast.add_terms(energy[2], both, mean[2]);
 }
 
 impl Sums<Lanes> {
     #[inline(always)]
-    fn add_terms(&mut self, energy: Lanes, count: Lanes) {
+    fn add_terms(&mut self, energy: Lanes, count: Lanes, weight: Lanes) {
         for x in 0..LANES {
             self.energy[x] += energy[x];
             self.count[x] += count[x];
+            self.weight[x] += weight[x];
         }
     }
 }

@@ -3,9 +3,7 @@
 //! Each prior says that neighbours differ by a random amount of unknown variance. The variance that makes the data most probable
 //! satisfies `variance = sum of weighted squared differences / number of differences that the data determine` (MacKay, Neural
 //! Computation 4, 415 (1992)). For a field with the information `g` in each cell and a prior of the weight `w`, the share that the
-//! data determine at the spatial frequency k is `g / (g + w |D(k)|^2)`; its mean over all frequencies is the share of a difference
-//! that has this weight. An edge of the albedo has next to no weight, so the data determine it alone. All second differences of the
-//! surface count with their mean weight, because the crests of a wave are no edges.
+//! data determine at the spatial frequency k is `g / (g + w |D(k)|^2)`; its mean over all frequencies is the share of the tile.
 
 use super::plane::total;
 use crate::joint::model::{count, weights};
@@ -85,6 +83,8 @@ pub(super) struct Sums<T = f64> {
     pub energy: T,
     /// Number of differences.
     pub count: T,
+    /// Sum of the weights.
+    pub weight: T,
 }
 
 impl Sums {
@@ -92,6 +92,7 @@ impl Sums {
     fn add(&mut self, row: &Sums<Lanes>) {
         self.energy += total(row.energy);
         self.count += total(row.count);
+        self.weight += total(row.weight);
     }
 }
 
@@ -102,10 +103,6 @@ pub(super) struct PriorSums<T = f64> {
     pub brightness: Sums<T>,
     pub colour: Sums<T>,
     pub contrast: Sums<T>,
-    /// Sum of the weights of the bending.
-    pub bend_weight: T,
-    /// Sums of the shares that the data determine, of the differences of brightness, colour and contrast.
-    pub determined: [T; 3],
 }
 
 impl PriorSums {
@@ -116,8 +113,6 @@ impl PriorSums {
         self.brightness.add(&row.brightness);
         self.colour.add(&row.colour);
         self.contrast.add(&row.contrast);
-        self.bend_weight += total(row.bend_weight);
-        self.determined.iter_mut().zip(row.determined).for_each(|(sum, row)| *sum += total(row));
     }
 }
 
@@ -165,33 +160,25 @@ impl Scales {
         self.channel_contrast = change.map(|value| (value / mean.max(1e-6)).clamp(0.5, 1.5));
     }
 
-    /// Weights of the priors of brightness, colour and contrast relative to the information of a cell, where Student's t has a weight
-    /// of 1.
-    pub fn relative_weights(&self, information: Information) -> [f32; 3] {
-        let Information { albedo, contrast, .. } = information;
-        [(self.brightness, albedo), (self.colour, albedo), (self.contrast, contrast)]
-            .map(|(variance, information)| self.noise / (variance * information.max(1e-12)))
-    }
-
     /// Estimates the variances of the priors, and the numbers of unknowns that the data determine. The variance of the bending is
     /// at most `bend_max`. As long as it is that, the variance of the contrast does not rise, or contrast would explain what the surface
     /// may not (J43).
     pub fn estimate_priors(
         &mut self,
         sums: &PriorSums,
-        Information { phase, .. }: Information,
+        information: Information,
         channels: f32,
         bend_max: f32,
     ) {
-        let mean = |sum: f64, sums: &Sums| (sum / sums.count.max(1e-9)) as f32;
-        let [bright, colour, contrast] = sums.determined;
+        let Information { phase, albedo, contrast } = information;
+        let noise = self.noise;
+        let weight =
+            |sums: &Sums, variance: f32| (sums.weight / sums.count.max(1e-9)) as f32 * noise / variance;
         self.determined = Determined {
-            phase: bend_share(
-                mean(sums.bend_weight, &sums.bend) * self.noise / (self.bend * phase.max(1e-12)),
-            ),
-            brightness: mean(bright, &sums.brightness),
-            colour: mean(colour, &sums.colour),
-            contrast: mean(contrast, &sums.contrast),
+            phase: bend_share(weight(&sums.bend, self.bend) / phase.max(1e-12)),
+            brightness: difference_share(weight(&sums.brightness, self.brightness) / albedo.max(1e-12)),
+            colour: difference_share(weight(&sums.colour, self.colour) / albedo.max(1e-12)),
+            contrast: difference_share(weight(&sums.contrast, self.contrast) / contrast.max(1e-12)),
         };
         let update = |sums: &Sums, each: f32, share: f32, start: f32, old: f32| {
             let count = f64::from(each) * sums.count * f64::from(share.max(DETERMINED_MIN));
@@ -210,7 +197,7 @@ impl Scales {
     }
 }
 
-/// Number of frequencies in each direction for the mean below.
+/// Number of frequencies in each direction for the means below.
 const FREQUENCIES: usize = 8;
 
 /// Squared response of a first difference at frequency number `n`.
@@ -218,20 +205,22 @@ fn response(n: usize) -> f32 {
     2.0 - 2.0 * (std::f32::consts::PI * (n as f32 + 0.5) / FREQUENCIES as f32).cos()
 }
 
-/// Share of a second difference that the data determine, by the weight of its prior relative to the information of a cell: the mean
-/// over all frequencies.
-fn bend_share(relative: f32) -> f32 {
+fn mean_share(square: impl Fn(f32) -> f32) -> f32 {
     let sum: f32 = (0..FREQUENCIES * FREQUENCIES)
-        .map(|i| response(i / FREQUENCIES) + response(i % FREQUENCIES))
-        .map(|laplacian| 1.0 / (1.0 + relative * laplacian * laplacian))
+        .map(|i| square(response(i / FREQUENCIES) + response(i % FREQUENCIES)))
+        .map(|weighted| 1.0 / (1.0 + weighted))
         .sum();
     sum / (FREQUENCIES * FREQUENCIES) as f32
 }
 
-/// The same for first differences. The mean over all frequencies is this within 0.02.
-#[inline(always)]
-pub(super) fn difference_share(relative: f32) -> f32 {
-    (1.0 + 0.355 * relative) / (1.0 + (3.84 + 0.596 * relative) * relative)
+/// Share of a field that the data determine, by the weight of its bending relative to the information.
+fn bend_share(relative: f32) -> f32 {
+    mean_share(|laplacian| relative * laplacian * laplacian)
+}
+
+/// The same for first differences.
+fn difference_share(relative: f32) -> f32 {
+    mean_share(|gradient| relative * gradient)
 }
 
 /// Variance of the phase of a cell for unit variance of the noise, by its information and the weight of its bending. Noise passes

@@ -1,6 +1,7 @@
 //! The second and the third start.
 
 use super::plane::{Plane, total, vectors};
+use super::solve::Effort;
 use super::start::contrast_and_albedo;
 use super::tests::{Errors, RATIOS, errors, random, tile};
 use super::tile::Tile;
@@ -40,10 +41,10 @@ fn printed() -> Case {
     )
 }
 
-/// A tile with a photograph in each channel, whose phase at the start has ripples of 0.9 rad.
+/// A tile with a photograph in each channel, whose phase at the start has ripples of 1.3 rad.
 fn photographed() -> Case {
     case(
-        |y, x| 0.9 * (0.5 * x as f32).sin() * (0.4 * y as f32).cos(),
+        |y, x| 1.3 * (0.5 * x as f32).sin() * (0.4 * y as f32).cos(),
         |c, y, x| 0.4 * (0.8 * random(c + 4, y / 3 * SIDE + x / 3)).exp(),
     )
 }
@@ -52,7 +53,7 @@ fn photographed() -> Case {
 fn first_error(Case { mut tile, truth }: Case) -> f32 {
     tile.unknown.phase.copy(&tile.start);
     contrast_and_albedo(&mut tile, 1.0);
-    tile.descend(NOISE, tile.scales.bend, OUTER_STEPS);
+    tile.descend(NOISE, tile.scales.bend, OUTER_STEPS, Effort::usual());
     errors(&tile, &truth).rms
 }
 
@@ -74,5 +75,5 @@ fn more_starts_leave_a_wrong_minimum_in_a_print() {
 
 #[test]
 fn more_starts_remove_the_ripples_of_a_photograph() {
-    check_more_starts(photographed, &Errors { rms: 0.015, largest: 0.1 });
+    check_more_starts(photographed, &Errors { rms: 0.01, largest: 0.1 });
 }

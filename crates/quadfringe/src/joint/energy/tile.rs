@@ -2,7 +2,7 @@
 
 use super::plane::{Derivatives, Fields, Plane, Weights};
 use super::preconditioner::Preconditioner;
-use super::scales::{Information, Scales};
+use super::scales::Scales;
 
 /// Results of one tile; 0 outside the lit cells.
 #[derive(Debug, Default)]
@@ -42,8 +42,6 @@ pub(super) struct Tile {
     pub pair: bool,
     pub infrared: [Plane; 2],
     pub scales: Scales,
-    /// Mean information of a cell when the scales were estimated.
-    pub information: Information,
     /// Variance of the second differences of the phase that the shot suggests, whatever `detail` is, rad^2.
     pub bend: f32,
     pub unknown: Fields,
