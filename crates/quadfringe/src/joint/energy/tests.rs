@@ -9,7 +9,7 @@ use super::scales::variance_share;
 use super::solve::multiply;
 use super::tile::Tile;
 use super::value::{Given, add_energy};
-use crate::joint::params::energy::{DISCARDED, SIDE};
+use crate::joint::params::energy::SIDE;
 
 pub(super) const RATIOS: [f32; 4] = [1.0, 35.0 / 36.0, 1.0, 30.0 / 36.0];
 
@@ -49,18 +49,15 @@ pub(super) struct Errors {
     pub largest: f32,
 }
 
-/// Rows and columns that are not discarded where tiles meet.
-const KEPT: std::ops::Range<usize> = DISCARDED..SIDE - DISCARDED;
-
 pub(super) fn errors(tile: &Tile, truth: &Plane) -> Errors {
     let (mut squares, mut largest) = (0.0f32, 0.0f32);
-    for y in KEPT {
-        for (found, truth) in tile.unknown.phase.row(y)[KEPT].iter().zip(&truth.row(y)[KEPT]) {
+    for y in 0..SIDE {
+        for (found, truth) in tile.unknown.phase.row(y).iter().zip(truth.row(y)) {
             squares += (found - truth).powi(2);
             largest = largest.max((found - truth).abs());
         }
     }
-    Errors { rms: squares.sqrt() / KEPT.len() as f32, largest }
+    Errors { rms: (squares / (SIDE * SIDE) as f32).sqrt(), largest }
 }
 
 #[test]

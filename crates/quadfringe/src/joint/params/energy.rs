@@ -95,8 +95,8 @@ pub const RESIDUAL_LEFT: f64 = 1e-2;
 /// The same as `INNER_STEPS` while the surface is stiff at the later starts (J43). More: time. Fewer: long ripples of the start stay.
 /// `python evaluation/sensitivity.py --only STIFF`.
 pub const STIFF_INNER_STEPS: usize = 60;
-/// The same as `RESIDUAL_LEFT` there. Larger: long ripples of the start stay, which are a small share of this residual (with 1e-2
-/// photographs have 6 to 10 % more error). Smaller: time. `python evaluation/sensitivity.py --only STIFF`.
+/// The same as `RESIDUAL_LEFT` there. Larger: long ripples of the start stay, which are a small share of this residual. Smaller: time.
+/// `python evaluation/sensitivity.py --only STIFF`.
 pub const STIFF_RESIDUAL_LEFT: f64 = 1e-3;
 /// Mean squared length of the step that is left in a cell, in the same norm and in units of the variance of the noise, at which
 /// they end as well. Larger: white surfaces are less exact (3e-3: faces 8 %, waves of 39 px keep 0.75 instead of 0.83 of their
