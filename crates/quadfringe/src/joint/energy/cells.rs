@@ -1,6 +1,7 @@
 //! The cells of a shot: means of a few pixels, which the tiles read, and the way back to the pixels.
 
 use super::average::{Surfaces, mean, surfaces};
+use super::gaps::{Gaps, Maps};
 use super::tile::Tile;
 use crate::joint::cells::{blend, spread};
 use crate::joint::infrared::wave;
@@ -25,8 +26,10 @@ pub(super) struct Cells {
     phase: Vec<f32>,
     /// 1 for cells that can be used in the fit; after it the variance times `inside`.
     usable: Vec<f32>,
-    /// 1 for cells whose pixels are all lit and lie on one surface; after the fit for those that it reaches.
+    /// 1 for cells whose pixels are all lit and lie on one surface, and for those in narrow gaps between them; after the fit for those
+    /// that it reaches.
     inside: Vec<f32>,
+    gaps: Gaps,
     /// Of a calibrated pair, the tangent of the infrared phase at the mean phase: its value at a phase of 0, and its slope.
     infrared: [Vec<f32>; 2],
 }
@@ -117,6 +120,9 @@ impl Cells {
                 *usable = if *usable >= USABLE_MIN { *inside } else { 0.0 };
             }
         });
+        let Self { height, width, stride, phase, inside, contrast, gaps, .. } = self;
+        // They are not usable, because their light is none of the surface.
+        gaps.close(Maps { inside, torn: &mut contrast[0], phase, stride: *stride }, [*height, *width]);
         self.draw_tangents(scene);
     }
 

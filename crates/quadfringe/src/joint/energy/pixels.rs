@@ -1,12 +1,13 @@
-//! From the cells back to the pixels. Where the cells around a pixel lie on one surface, detail of the start that is finer than a cell
-//! (J44) is noise, or texture that the windows of the start have mixed, and the pixel takes the surface through the cells. At the
-//! discontinuities of the surface the pixels keep it.
+//! From the cells back to the pixels. Where the cells around a pixel lie on one surface, the pixel takes the surface through them: detail
+//! of the start that is finer than a cell is noise there, or texture that the windows of the start have mixed (J44). At the
+//! discontinuities of the surface the pixels keep it, and are moved as their cells are.
 
 use super::cells::{Cells, Rows};
 use crate::Reason;
 use crate::joint::params::energy::{CURVED_MAX, MOVED_MAX_RAD};
 use crate::joint::scene::{Pixels, Scene};
 use rayon::prelude::*;
+use std::iter::{repeat, repeat_n};
 
 /// What the fit has found for the surface at one cell.
 #[derive(Debug, Default)]
@@ -16,6 +17,21 @@ pub(super) struct Surface {
     /// Variance of the second differences of the phase (J26), rad^2.
     pub bend: f32,
 }
+
+/// Which of the 3 x 3 cells around a cell lie on one surface with it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) enum Around {
+    /// Not all that have a fit.
+    #[default]
+    Apart,
+    /// All that have a fit, at least one in each pair of opposite neighbours.
+    Partly,
+    /// All nine.
+    Wholly,
+}
+
+/// The fitted phase of 3 x 3 cells, rad.
+type Patch = [[f32; 3]; 3];
 
 /// A row of cells.
 #[derive(Debug, Default)]
@@ -32,63 +48,62 @@ struct Work {
     row: Option<usize>,
     /// The rows of cells above, at and below.
     lines: [Line; 3],
-    /// Whether the cells around lie on one surface.
-    smooth: Vec<bool>,
-    /// Phase of the surface of the start along a row of pixels, its mean over the columns of a cell.
-    means: Vec<f32>,
+    /// The columns of the cells in this row that lie on one surface with those around, and the phases of these.
+    patches: Vec<(usize, Patch)>,
 }
 
 impl Cells {
-    /// Replaces the phase of the start, in pixels among cells of one surface, by that of the surface through the cells, and marks these
-    /// cells as `smooth`. `fit` gives what the fit has found for a cell.
-    pub fn smooth_start(
+    /// Gives pixels among cells of one surface the phase of the surface through these, and writes for each cell which of those `around`
+    /// it lie on one surface with it. `fit` gives what the fit has found for a cell.
+    pub fn write_surface(
         &self,
         scene: &Scene<'_>,
         fit: impl Fn(usize, usize) -> Option<Surface> + Sync,
         phase: &mut [f32],
-        smooth: &mut Vec<bool>,
+        around: &mut Vec<Around>,
     ) {
         let stride = scene.grid.stride;
-        smooth.clear();
-        smooth.resize(self.height * self.width, false);
-        let marks = smooth.par_chunks_mut(self.width.max(1));
+        around.clear();
+        around.resize(self.height * self.width, Around::Apart);
+        let marks = around.par_chunks_mut(self.width.max(1));
         let bands = phase.par_chunks_mut(self.factor * stride).zip(marks).enumerate();
         bands.for_each_init(Work::default, |work, (row, (phase, marks))| {
             if row == 0 || row + 1 >= self.height {
                 return;
             }
             self.load_lines(row, &fit, work);
-            work.find_smooth();
-            if !work.smooth.contains(&true) {
-                return;
-            }
-            marks.copy_from_slice(&work.smooth);
+            work.find_patches(marks);
             for (i, phase) in phase.chunks_mut(stride).enumerate() {
-                self.take_surface([row, i], work, phase);
+                let down = parabola(i, self.factor);
+                for (x, patch) in &work.patches {
+                    let three = [0, 1, 2].map(|k| mix(down, patch.map(|line| line[k])));
+                    for (i, phase) in phase[x * self.factor..][..self.factor].iter_mut().enumerate() {
+                        *phase = mix(parabola(i, self.factor), three);
+                    }
+                }
             }
         });
     }
 
-    /// Writes for each of the `width` pixels of row `y` whether it lies among cells that are `smooth`.
-    pub fn write_smooth(&self, smooth: &[bool], y: usize, width: usize, out: &mut Vec<bool>) {
+    /// Which cells around the pixels of row `y` lie on one surface.
+    pub fn marks(&self, around: &[Around], y: usize) -> impl Iterator<Item = Around> {
         let row = y / self.factor * self.width;
-        out.clear();
-        if let Some(cells) = smooth.get(row..row + self.width) {
-            out.extend(cells.iter().flat_map(|mark| std::iter::repeat_n(*mark, self.factor)));
-        }
-        out.resize(width, false);
+        let cells = around.get(row..row + self.width).unwrap_or_default();
+        cells.iter().flat_map(|mark| repeat_n(*mark, self.factor)).chain(repeat(Around::Apart))
     }
 
-    /// Adds the interpolated correction to the phase of the pixels. Where it is too large, the modulation becomes 0.
-    pub fn correct(&self, scene: &Scene<'_>, pixels: &mut Pixels) {
+    /// Adds the interpolated correction to the phase of the pixels that have not got that of the surface. Where it is too large, the
+    /// modulation becomes 0.
+    pub fn correct(&self, scene: &Scene<'_>, around: &[Around], pixels: &mut Pixels) {
         let stride = scene.grid.stride;
         let Pixels { phase, modulation, reasons } = pixels;
         let planes = phase.par_chunks_mut(stride).zip(modulation.par_chunks_mut(stride));
         let rows = planes.zip(reasons.par_chunks_mut(stride)).enumerate();
         rows.for_each_init(Rows::default, |rows, (y, ((phase, modulation), reasons))| {
             let pixels = phase.iter_mut().zip(modulation).zip(reasons);
-            for (((phase, modulation), reason), correction) in pixels.zip(self.corrections(scene, y, rows)) {
-                *phase += correction;
+            let moves = self.corrections(scene, y, rows).iter().zip(self.marks(around, y));
+            for (((phase, modulation), reason), (correction, around)) in pixels.zip(moves) {
+                *phase += if around == Around::Apart { *correction } else { 0.0 };
                 if correction.abs() > MOVED_MAX_RAD && *modulation > 0.0 {
                     *modulation = 0.0;
                     *reason = if *reason == Reason::Returned { Reason::Misfit } else { *reason };
@@ -113,41 +128,45 @@ impl Cells {
             }
         }
     }
+}
 
-    /// Replaces the phase of pixels in row `i` of a row of cells by that of the parabolas along rows and columns that have the means of
-    /// the cells.
-    fn take_surface(&self, [row, i]: [usize; 2], work: &mut Work, phase: &mut [f32]) {
-        let Work { smooth, means, .. } = work;
-        let down = parabola(i, self.factor);
-        means.clear();
-        means.extend((0..self.width).map(|x| mix(down, [row - 1, row, row + 1].map(|y| self.start(y, x)))));
-        for x in (0..self.width).filter(|&x| smooth[x]) {
-            let three = [means[x - 1], means[x], means[x + 1]];
-            for (i, phase) in phase[x * self.factor..][..self.factor].iter_mut().enumerate() {
-                *phase = mix(parabola(i, self.factor), three);
+impl Work {
+    /// Finds the cells through which no second difference is larger than the bending of the tile explains.
+    fn find_patches(&mut self, marks: &mut [Around]) {
+        let Self { lines, patches, .. } = self;
+        patches.clear();
+        for x in 1..marks.len().saturating_sub(1) {
+            let known = lines.each_ref().map(|Line { fitted, .. }| [fitted[x - 1], fitted[x], fitted[x + 1]]);
+            let patch = continued(known);
+            if is_one_surface(&patch, CURVED_MAX * CURVED_MAX * lines[1].bend[x]) {
+                let whole = known.as_flattened().iter().all(|phase| phase.is_finite());
+                marks[x] = if whole { Around::Wholly } else { Around::Partly };
+                patches.push((x, patch));
             }
         }
     }
 }
 
-impl Work {
-    /// Finds the cells through which no second difference is larger than the bending of the tile explains, and whose neighbours have
-    /// a fit.
-    fn find_smooth(&mut self) {
-        let Self { lines, smooth, .. } = self;
-        let [above, here, below] = lines.each_ref().map(|line| &line.fitted);
-        let width = here.len();
-        smooth.clear();
-        smooth.extend((0..width).map(|x| {
-            let most = CURVED_MAX * CURVED_MAX * lines[1].bend[x];
-            // A comparison with no number is false.
-            let gentle = |three: [f32; 3]| (three[0] - 2.0 * three[1] + three[2]).powi(2) <= most;
-            let inner = x > 0 && x + 1 < width;
-            inner
-                && [above, here, below].iter().all(|line| gentle([line[x - 1], line[x], line[x + 1]]))
-                && (x - 1..=x + 1).all(|x| gentle([above[x], here[x], below[x]]))
-        }));
+/// Continues the surface straight into neighbours without a fit; not a number where both of an opposite pair have none.
+fn continued(mut patch: Patch) -> Patch {
+    let middle = patch[1][1];
+    for (y, x) in [(0, 1), (1, 0), (1, 2), (2, 1)] {
+        if !patch[y][x].is_finite() {
+            patch[y][x] = 2.0 * middle - patch[2 - y][2 - x];
+        }
     }
+    for (y, x) in [(0, 0), (0, 2), (2, 0), (2, 2)] {
+        if !patch[y][x].is_finite() {
+            patch[y][x] = patch[1][x] + patch[y][1] - middle;
+        }
+    }
+    patch
+}
+
+/// Whether no squared second difference along a row or a column exceeds `most`. A comparison with no number is false.
+fn is_one_surface(patch: &Patch, most: f32) -> bool {
+    let gentle = |three: [f32; 3]| (three[0] - 2.0 * three[1] + three[2]).powi(2) <= most;
+    patch.iter().all(|row| gentle(*row)) && (0..3).all(|x| gentle(patch.map(|row| row[x])))
 }
 
 /// Weights of three cells at pixel `i` of the middle one, for the parabola whose means over the pixels are those of the cells.
@@ -181,19 +200,39 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_step_or_a_missing_cell_ends_the_surface() {
-        let smooth = |change: f32| {
-            let line = || Line {
-                fitted: (0..8).map(|x| 0.6 * x as f32 + if x > 4 { change } else { 0.0 }).collect(),
-                bend: vec![1e-4; 8],
-            };
-            let mut work = Work { lines: [line(), line(), line()], ..Work::default() };
-            work.find_smooth();
-            work.smooth
+    /// What lies around the cells of a row of the slope 0.6 rad, from column 5 on higher by `change`.
+    fn around(change: f32) -> [Around; 8] {
+        let line = || Line {
+            fitted: (0..8).map(|x| 0.6 * x as f32 + if x > 4 { change } else { 0.0 }).collect(),
+            bend: vec![1e-4; 8],
         };
-        assert_eq!(smooth(0.0), [false, true, true, true, true, true, true, false]);
-        assert_eq!(smooth(0.3), [false, true, true, true, false, false, true, false]);
-        assert_eq!(smooth(f32::NAN), [false, true, true, true, false, false, false, false]);
+        let mut work = Work { lines: [line(), line(), line()], ..Work::default() };
+        let mut marks = [Around::Apart; 8];
+        work.find_patches(&mut marks);
+        for (x, patch) in &work.patches {
+            let straight = patch.iter().all(|line| (line[2] - line[1] - 0.6).abs() < 1e-5);
+            assert!(straight, "{x}: {patch:?}");
+        }
+        marks
+    }
+
+    #[test]
+    fn a_step_ends_the_surface_and_a_missing_cell_does_not() {
+        use Around::{Apart, Partly, Wholly};
+        assert_eq!(around(0.0), [Apart, Wholly, Wholly, Wholly, Wholly, Wholly, Wholly, Apart]);
+        assert_eq!(around(0.3), [Apart, Wholly, Wholly, Wholly, Apart, Apart, Wholly, Apart]);
+        assert_eq!(around(f32::NAN), [Apart, Wholly, Wholly, Wholly, Partly, Apart, Apart, Apart]);
+    }
+
+    #[test]
+    fn a_corner_continues_its_sides_and_a_lone_cell_does_not_continue() {
+        let plane = |y: usize, x: usize| 0.5 * x as f32 - 0.2 * y as f32;
+        let whole: Patch = std::array::from_fn(|y| std::array::from_fn(|x| plane(y, x)));
+        let mut patch = whole;
+        (patch[0][0], patch[0][1], patch[2][2]) = (f32::NAN, f32::NAN, f32::NAN);
+        let pairs = |found: Patch| found.concat().into_iter().zip(whole.concat());
+        assert!(pairs(continued(patch)).all(|(found, truth)| (found - truth).abs() < 1e-6));
+        patch[2][1] = f32::NAN;
+        assert!(!is_one_surface(&continued(patch), 1.0));
     }
 }

@@ -11,7 +11,7 @@ pub const CORRECTION_LEFT: f32 = 0.05;
 /// The same in a tile with more than one start, where the differences of the minima show a part of this error (U19). Larger: the
 /// uncertainty on prints and patches is too large (`pytest tests/test_prints.py`). Smaller: that on cloth is too small. At half and at
 /// twice the value: see docs/method/uncertainty.md.
-pub const CORRECTION_LEFT_COMPARED: f32 = 0.02;
+pub const CORRECTION_LEFT_COMPARED: f32 = 0.01;
 /// Share of the residuals beyond noise that counts as an error of the model, which neighbouring cells share (U14). Larger: the
 /// uncertainty on photographs is too large. Smaller: that on real captures is too small. `python evaluation/world.py --half tune
 /// --only photographs`; at half and at twice the value: see docs/method/uncertainty.md.
