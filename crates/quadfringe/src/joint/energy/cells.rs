@@ -122,7 +122,7 @@ impl Cells {
         });
         let Self { height, width, stride, phase, inside, contrast, gaps, .. } = self;
         // They are not usable, because their light is none of the surface.
-        gaps.close(Maps { inside, torn: &mut contrast[0], phase, stride: *stride }, [*height, *width]);
+        gaps.close(Maps { inside, torn: &contrast[0], phase, stride: *stride }, [*height, *width]);
         self.draw_tangents(scene);
     }
 

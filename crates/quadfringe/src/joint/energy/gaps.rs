@@ -1,6 +1,6 @@
-//! Narrow gaps of the surface. Print that reflects next to no light, a narrow shadow, or torn cells cut a surface in pieces, and the
-//! light of a narrow piece can hardly tell its phase. So the cells of a gap become a part of the surface, without light, where the
-//! phases on both sides continue each other.
+//! Narrow gaps of the surface. Print that reflects next to no light, or a narrow shadow, cuts a surface in pieces, and the light of a
+//! narrow piece can hardly tell its phase. So the cells of a gap become a part of the surface, without light, where the phases on both
+//! sides continue each other. Torn cells do not, because there may be an edge of the surface.
 
 use crate::joint::params::energy::GAP_MAX_CELLS;
 use crate::joint::params::validity::SAME_SURFACE_RAD;
@@ -25,7 +25,7 @@ pub(super) struct Maps<'a> {
     /// 1 for lit cells.
     pub inside: &'a mut [f32],
     /// 1 for torn cells.
-    pub torn: &'a mut [f32],
+    pub torn: &'a [f32],
     /// Mean phase of lit cells, rad.
     pub phase: &'a mut [f32],
     pub stride: usize,
@@ -40,12 +40,12 @@ struct Lit<'a> {
 }
 
 impl Gaps {
-    /// Makes the cells in gaps lit ones that are not torn, in `height` rows and `width` columns.
+    /// Makes the cells in gaps lit ones, in `height` rows and `width` columns.
     pub fn close(&mut self, Maps { inside, torn, phase, stride }: Maps<'_>, size: [usize; 2]) {
         self.find(Lit { inside, phase, stride }, size);
         // Where a cell lies in two gaps, that along the row counts.
-        for &GapCell { at, phase: between } in self.found.iter().rev() {
-            (inside[at], torn[at], phase[at]) = (1.0, 0.0, between);
+        for &GapCell { at, phase: between } in self.found.iter().rev().filter(|cell| torn[cell.at] == 0.0) {
+            (inside[at], phase[at]) = (1.0, between);
         }
     }
 
@@ -132,12 +132,16 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_along_a_column_is_closed_too() {
-        let (mut inside, mut torn) = ([1.0, 1.0, 0.0, 1.0, 1.0], [0.0, 0.0, 1.0, 0.0, 0.0]);
-        let mut phase = [0.0, 0.1, 9.0, 0.3, 0.4];
-        let maps = Maps { inside: &mut inside, torn: &mut torn, phase: &mut phase, stride: 1 };
-        Gaps::default().close(maps, [5, 1]);
-        assert_eq!((inside, torn), ([1.0; 5], [0.0; 5]));
-        assert!((phase[2] - 0.2).abs() < 1e-6, "{phase:?}");
+    fn a_gap_along_a_column_is_closed_and_a_torn_cell_is_not() {
+        let closed = |torn: &[f32]| {
+            let mut inside = [1.0, 1.0, 0.0, 1.0, 1.0];
+            let mut phase = [0.0, 0.1, 9.0, 0.3, 0.4];
+            let maps = Maps { inside: &mut inside, torn, phase: &mut phase, stride: 1 };
+            Gaps::default().close(maps, [5, 1]);
+            (inside[2], phase[2])
+        };
+        let (inside, phase) = closed(&[0.0; 5]);
+        assert!(inside == 1.0 && (phase - 0.2).abs() < 1e-6, "{inside} {phase}");
+        assert_eq!(closed(&[0.0, 0.0, 1.0, 0.0, 0.0]), (0.0, 9.0));
     }
 }

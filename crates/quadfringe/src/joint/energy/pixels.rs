@@ -18,19 +18,7 @@ pub(super) struct Surface {
     pub bend: f32,
 }
 
-/// Which of the 3 x 3 cells around a cell lie on one surface with it.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) enum Around {
-    /// Not all that have a fit.
-    #[default]
-    Apart,
-    /// All that have a fit, at least one in each pair of opposite neighbours.
-    Partly,
-    /// All nine.
-    Wholly,
-}
-
-/// The fitted phase of 3 x 3 cells, rad.
+/// The fitted phase of 3 x 3 cells, rad; not a number outside the cells of the fit.
 type Patch = [[f32; 3]; 3];
 
 /// A row of cells.
@@ -48,62 +36,60 @@ struct Work {
     row: Option<usize>,
     /// The rows of cells above, at and below.
     lines: [Line; 3],
-    /// The columns of the cells in this row that lie on one surface with those around, and the phases of these.
-    patches: Vec<(usize, Patch)>,
+    /// The columns of the cells in this row that lie on one surface with those around, and this surface.
+    surfaces: Vec<(usize, Quadric)>,
 }
 
 impl Cells {
-    /// Gives pixels among cells of one surface the phase of the surface through these, and writes for each cell which of those `around`
-    /// it lie on one surface with it. `fit` gives what the fit has found for a cell.
+    /// Gives pixels among cells of one surface the phase of the surface through these, and marks these cells as `smooth`. `fit` gives
+    /// what the fit has found for a cell.
     pub fn write_surface(
         &self,
         scene: &Scene<'_>,
         fit: impl Fn(usize, usize) -> Option<Surface> + Sync,
         phase: &mut [f32],
-        around: &mut Vec<Around>,
+        smooth: &mut Vec<bool>,
     ) {
         let stride = scene.grid.stride;
-        around.clear();
-        around.resize(self.height * self.width, Around::Apart);
-        let marks = around.par_chunks_mut(self.width.max(1));
+        smooth.clear();
+        smooth.resize(self.height * self.width, false);
+        let marks = smooth.par_chunks_mut(self.width.max(1));
         let bands = phase.par_chunks_mut(self.factor * stride).zip(marks).enumerate();
         bands.for_each_init(Work::default, |work, (row, (phase, marks))| {
             if row == 0 || row + 1 >= self.height {
                 return;
             }
             self.load_lines(row, &fit, work);
-            work.find_patches(marks);
+            work.find_surfaces(marks);
             for (i, phase) in phase.chunks_mut(stride).enumerate() {
-                let down = parabola(i, self.factor);
-                for (x, patch) in &work.patches {
-                    let three = [0, 1, 2].map(|k| mix(down, patch.map(|line| line[k])));
-                    for (i, phase) in phase[x * self.factor..][..self.factor].iter_mut().enumerate() {
-                        *phase = mix(parabola(i, self.factor), three);
+                for (x, surface) in &work.surfaces {
+                    for (j, phase) in phase[x * self.factor..][..self.factor].iter_mut().enumerate() {
+                        *phase = surface.at([j, i], self.factor);
                     }
                 }
             }
         });
     }
 
-    /// Which cells around the pixels of row `y` lie on one surface.
-    pub fn marks(&self, around: &[Around], y: usize) -> impl Iterator<Item = Around> {
+    /// Whether the pixels of row `y` lie among cells that are `smooth`.
+    pub fn marks(&self, smooth: &[bool], y: usize) -> impl Iterator<Item = bool> {
         let row = y / self.factor * self.width;
-        let cells = around.get(row..row + self.width).unwrap_or_default();
-        cells.iter().flat_map(|mark| repeat_n(*mark, self.factor)).chain(repeat(Around::Apart))
+        let cells = smooth.get(row..row + self.width).unwrap_or_default();
+        cells.iter().flat_map(|mark| repeat_n(*mark, self.factor)).chain(repeat(false))
     }
 
     /// Adds the interpolated correction to the phase of the pixels that have not got that of the surface. Where it is too large, the
     /// modulation becomes 0.
-    pub fn correct(&self, scene: &Scene<'_>, around: &[Around], pixels: &mut Pixels) {
+    pub fn correct(&self, scene: &Scene<'_>, smooth: &[bool], pixels: &mut Pixels) {
         let stride = scene.grid.stride;
         let Pixels { phase, modulation, reasons } = pixels;
         let planes = phase.par_chunks_mut(stride).zip(modulation.par_chunks_mut(stride));
         let rows = planes.zip(reasons.par_chunks_mut(stride)).enumerate();
         rows.for_each_init(Rows::default, |rows, (y, ((phase, modulation), reasons))| {
             let pixels = phase.iter_mut().zip(modulation).zip(reasons);
-            let moves = self.corrections(scene, y, rows).iter().zip(self.marks(around, y));
-            for (((phase, modulation), reason), (correction, around)) in pixels.zip(moves) {
-                *phase += if around == Around::Apart { *correction } else { 0.0 };
+            let moves = self.corrections(scene, y, rows).iter().zip(self.marks(smooth, y));
+            for (((phase, modulation), reason), (correction, smooth)) in pixels.zip(moves) {
+                *phase += if smooth { 0.0 } else { *correction };
                 if correction.abs() > MOVED_MAX_RAD && *modulation > 0.0 {
                     *modulation = 0.0;
                     *reason = if *reason == Reason::Returned { Reason::Misfit } else { *reason };
@@ -131,36 +117,19 @@ impl Cells {
 }
 
 impl Work {
-    /// Finds the cells through which no second difference is larger than the bending of the tile explains.
-    fn find_patches(&mut self, marks: &mut [Around]) {
-        let Self { lines, patches, .. } = self;
-        patches.clear();
-        for x in 1..marks.len().saturating_sub(1) {
-            let known = lines.each_ref().map(|Line { fitted, .. }| [fitted[x - 1], fitted[x], fitted[x + 1]]);
-            let patch = continued(known);
-            if is_one_surface(&patch, CURVED_MAX * CURVED_MAX * lines[1].bend[x]) {
-                let whole = known.as_flattened().iter().all(|phase| phase.is_finite());
-                marks[x] = if whole { Around::Wholly } else { Around::Partly };
-                patches.push((x, patch));
+    /// Finds the cells through which no second difference is larger than the bending of the tile explains, and whose neighbours have a
+    /// fit.
+    fn find_surfaces(&mut self, smooth: &mut [bool]) {
+        let Self { lines, surfaces, .. } = self;
+        surfaces.clear();
+        for x in 1..smooth.len().saturating_sub(1) {
+            let patch = lines.each_ref().map(|Line { fitted, .. }| [fitted[x - 1], fitted[x], fitted[x + 1]]);
+            smooth[x] = is_one_surface(&patch, CURVED_MAX * CURVED_MAX * lines[1].bend[x]);
+            if smooth[x] {
+                surfaces.push((x, Quadric::through(&patch)));
             }
         }
     }
-}
-
-/// Continues the surface straight into neighbours without a fit; not a number where both of an opposite pair have none.
-fn continued(mut patch: Patch) -> Patch {
-    let middle = patch[1][1];
-    for (y, x) in [(0, 1), (1, 0), (1, 2), (2, 1)] {
-        if !patch[y][x].is_finite() {
-            patch[y][x] = 2.0 * middle - patch[2 - y][2 - x];
-        }
-    }
-    for (y, x) in [(0, 0), (0, 2), (2, 0), (2, 2)] {
-        if !patch[y][x].is_finite() {
-            patch[y][x] = patch[1][x] + patch[y][1] - middle;
-        }
-    }
-    patch
 }
 
 /// Whether no squared second difference along a row or a column exceeds `most`. A comparison with no number is false.
@@ -169,16 +138,45 @@ fn is_one_surface(patch: &Patch, most: f32) -> bool {
     patch.iter().all(|row| gentle(*row)) && (0..3).all(|x| gentle(patch.map(|row| row[x])))
 }
 
-/// Weights of three cells at pixel `i` of the middle one, for the parabola whose means over the pixels are those of the cells.
-fn parabola(i: usize, pixels: usize) -> [f32; 3] {
-    let side = pixels as f32;
-    let place = (i as f32 + 0.5) / side - 0.5;
-    let half_square = 0.5 * (place * place - (1.0 - 1.0 / (side * side)) / 12.0);
-    [half_square - 0.5 * place, 1.0 - 2.0 * half_square, half_square + 0.5 * place]
+/// A surface of the second order, from the middle of a cell and in cells: right and down.
+#[derive(Debug)]
+struct Quadric {
+    /// Mean over the cell.
+    mean: f32,
+    slope: [f32; 2],
+    /// Halves of the second derivatives along both directions.
+    bend: [f32; 2],
+    twist: f32,
 }
 
-fn mix(weights: [f32; 3], values: [f32; 3]) -> f32 {
-    weights.iter().zip(values).map(|(weight, value)| weight * value).sum()
+impl Quadric {
+    /// The surface whose means over nine cells come nearest to those of the patch, by least squares.
+    fn through(patch: &Patch) -> Self {
+        let mean = |three: [f32; 3]| (three[0] + three[1] + three[2]) / 3.0;
+        let means = [[0, 1, 2].map(|x| mean(patch.map(|row| row[x]))), patch.map(mean)];
+        let bend = means.map(|three| 0.5 * (three[0] - 2.0 * three[1] + three[2]));
+        Self {
+            // Over three cells, the mean of the square of the distance is 2/3 more than over the middle one.
+            mean: mean(means[1]) - 2.0 / 3.0 * (bend[0] + bend[1]),
+            slope: means.map(|three| 0.5 * (three[2] - three[0])),
+            bend,
+            twist: 0.25 * (patch[0][0] - patch[0][2] - patch[2][0] + patch[2][2]),
+        }
+    }
+
+    /// Its value at pixel `[x, y]` of a cell with this many pixels along a side.
+    fn at(&self, pixel: [usize; 2], side: usize) -> f32 {
+        let side = side as f32;
+        let [x, y] = pixel.map(|i| (i as f32 + 0.5) / side - 0.5);
+        // Mean of the square of the distance over the pixels of a cell.
+        let square = (1.0 - 1.0 / (side * side)) / 12.0;
+        self.mean
+            + self.slope[0] * x
+            + self.slope[1] * y
+            + self.bend[0] * (x * x - square)
+            + self.bend[1] * (y * y - square)
+            + self.twist * x * y
+    }
 }
 
 #[cfg(test)]
@@ -186,53 +184,50 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_surface_has_the_means_of_its_cells_and_follows_a_parabola() {
-        for pixels in [1, 2, 4] {
-            let curve = |x: f32| 0.3 + 0.2 * x - 0.07 * x * x;
-            let mean = |cell: usize| {
-                (0..pixels).map(|i| curve((cell * pixels + i) as f32)).sum::<f32>() / pixels as f32
+    fn the_surface_through_the_means_of_cells_is_that_of_their_pixels() {
+        let surface = |x: f32, y: f32| 0.3 + 0.2 * x - 0.1 * y - 0.07 * x * x + 0.02 * y * y + 0.05 * x * y;
+        for side in [1, 2, 4] {
+            let pixels = || (0..side * side).map(|i| [i % side, i / side]);
+            let mean = |row: usize, column: usize| {
+                let at = |[x, y]: [usize; 2]| surface((column * side + x) as f32, (row * side + y) as f32);
+                pixels().map(at).sum::<f32>() / (side * side) as f32
             };
-            let three = [mean(0), mean(1), mean(2)];
-            for i in 0..pixels {
-                let (found, truth) = (mix(parabola(i, pixels), three), curve((pixels + i) as f32));
-                assert!((found - truth).abs() < 1e-4, "{pixels} {i}: {found} {truth}");
+            let patch: Patch = std::array::from_fn(|y| std::array::from_fn(|x| mean(y, x)));
+            let quadric = Quadric::through(&patch);
+            for [x, y] in pixels() {
+                let (found, truth) =
+                    (quadric.at([x, y], side), surface((side + x) as f32, (side + y) as f32));
+                assert!((found - truth).abs() < 1e-4, "{side} {x} {y}: {found} {truth}");
             }
         }
     }
 
-    /// What lies around the cells of a row of the slope 0.6 rad, from column 5 on higher by `change`.
-    fn around(change: f32) -> [Around; 8] {
-        let line = || Line {
-            fitted: (0..8).map(|x| 0.6 * x as f32 + if x > 4 { change } else { 0.0 }).collect(),
-            bend: vec![1e-4; 8],
+    #[test]
+    fn half_of_the_noise_of_single_cells_is_left() {
+        let square = |at: usize| {
+            let mut patch = Patch::default();
+            patch[at / 3][at % 3] = 1.0;
+            let quadric = Quadric::through(&patch);
+            (0..16).map(|i| quadric.at([i % 4, i / 4], 4).powi(2)).sum::<f32>() / 16.0
         };
-        let mut work = Work { lines: [line(), line(), line()], ..Work::default() };
-        let mut marks = [Around::Apart; 8];
-        work.find_patches(&mut marks);
-        for (x, patch) in &work.patches {
-            let straight = patch.iter().all(|line| (line[2] - line[1] - 0.6).abs() < 1e-5);
-            assert!(straight, "{x}: {patch:?}");
-        }
-        marks
+        let left: f32 = (0..9).map(square).sum();
+        assert!((0.5..0.62).contains(&left), "{left}");
     }
 
     #[test]
-    fn a_step_ends_the_surface_and_a_missing_cell_does_not() {
-        use Around::{Apart, Partly, Wholly};
-        assert_eq!(around(0.0), [Apart, Wholly, Wholly, Wholly, Wholly, Wholly, Wholly, Apart]);
-        assert_eq!(around(0.3), [Apart, Wholly, Wholly, Wholly, Apart, Apart, Wholly, Apart]);
-        assert_eq!(around(f32::NAN), [Apart, Wholly, Wholly, Wholly, Partly, Apart, Apart, Apart]);
-    }
-
-    #[test]
-    fn a_corner_continues_its_sides_and_a_lone_cell_does_not_continue() {
-        let plane = |y: usize, x: usize| 0.5 * x as f32 - 0.2 * y as f32;
-        let whole: Patch = std::array::from_fn(|y| std::array::from_fn(|x| plane(y, x)));
-        let mut patch = whole;
-        (patch[0][0], patch[0][1], patch[2][2]) = (f32::NAN, f32::NAN, f32::NAN);
-        let pairs = |found: Patch| found.concat().into_iter().zip(whole.concat());
-        assert!(pairs(continued(patch)).all(|(found, truth)| (found - truth).abs() < 1e-6));
-        patch[2][1] = f32::NAN;
-        assert!(!is_one_surface(&continued(patch), 1.0));
+    fn a_step_or_a_missing_cell_ends_the_surface() {
+        let smooth = |change: f32| {
+            let line = || Line {
+                fitted: (0..8).map(|x| 0.6 * x as f32 + if x > 4 { change } else { 0.0 }).collect(),
+                bend: vec![1e-4; 8],
+            };
+            let mut work = Work { lines: [line(), line(), line()], ..Work::default() };
+            let mut marks = [false; 8];
+            work.find_surfaces(&mut marks);
+            marks
+        };
+        assert_eq!(smooth(0.0), [false, true, true, true, true, true, true, false]);
+        assert_eq!(smooth(0.3), [false, true, true, true, false, false, true, false]);
+        assert_eq!(smooth(f32::NAN), [false, true, true, true, false, false, false, false]);
     }
 }
