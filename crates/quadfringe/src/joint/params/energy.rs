@@ -28,8 +28,7 @@ pub const CELL_MAX_PX: usize = 4;
 /// `python evaluation/sensitivity.py --only energy::SPREAD_MAX_RAD`.
 pub const SPREAD_MAX_RAD: f32 = 0.5;
 /// Greatest width of a gap of the surface in cells that takes part without light, about half a fringe. Larger: surfaces on both sides
-/// of a shadow bend each other (with 8, rods and clutter have 0.03 points more wrong orders). Smaller: narrow pieces of a surface
-/// between dark print are free. `python evaluation/sensitivity.py --only energy::GAP_MAX_CELLS`.
+/// of a shadow bend each other. Smaller: narrow pieces of a surface between dark print are free. `python evaluation/sensitivity.py --only energy::GAP_MAX_CELLS`.
 pub const GAP_MAX_CELLS: usize = 4;
 /// Least share of usable pixels of a cell that takes part. Larger: noise that saturates single pixels removes cells. Smaller: cells
 /// are biased by the pixels that are left out.
