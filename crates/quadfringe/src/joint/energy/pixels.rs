@@ -36,8 +36,15 @@ struct Work {
     row: Option<usize>,
     /// The rows of cells above, at and below.
     lines: [Line; 3],
-    /// The columns of the cells in this row that lie on one surface with those around, and this surface.
-    surfaces: Vec<(usize, Quadric)>,
+    /// The cells in this row that lie on one surface with those around.
+    surfaces: Vec<CellSurface>,
+}
+
+/// A cell that lies on one surface with those around, and this surface.
+#[derive(Debug)]
+struct CellSurface {
+    column: usize,
+    surface: Quadric,
 }
 
 impl Cells {
@@ -62,8 +69,8 @@ impl Cells {
             self.load_lines(row, &fit, work);
             work.find_surfaces(marks);
             for (i, phase) in phase.chunks_mut(stride).enumerate() {
-                for (x, surface) in &work.surfaces {
-                    for (j, phase) in phase[x * self.factor..][..self.factor].iter_mut().enumerate() {
+                for CellSurface { column, surface } in &work.surfaces {
+                    for (j, phase) in phase[column * self.factor..][..self.factor].iter_mut().enumerate() {
                         *phase = surface.at([j, i], self.factor);
                     }
                 }
@@ -126,7 +133,7 @@ impl Work {
             let patch = lines.each_ref().map(|Line { fitted, .. }| [fitted[x - 1], fitted[x], fitted[x + 1]]);
             smooth[x] = is_one_surface(&patch, CURVED_MAX * CURVED_MAX * lines[1].bend[x]);
             if smooth[x] {
-                surfaces.push((x, Quadric::through(&patch)));
+                surfaces.push(CellSurface { column: x, surface: Quadric::through(&patch) });
             }
         }
     }
