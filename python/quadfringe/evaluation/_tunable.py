@@ -2,7 +2,7 @@
 
 A number `pub const NAME: f32 = 1.0;` of a params file becomes a function that reads the number once, when a process
 first uses it: its value, multiplied by the factor in the environment variable `QUADFRINGE_TUNED`, as in
-`energy::SAME_RAD*0.5`. The names in the other files become calls. Numbers that give the length of an array stay.
+`energy::GAIN_MIN*0.5`. The names in the other files become calls. Numbers that give the length of an array stay.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ use super::start::{contrast_and_albedo, filter};
 use super::tile::Tile;
 use super::value::{Given, add_energy};
 use crate::joint::model::count;
-use crate::joint::params::energy::{SAME_RAD, SCALE_LIMITS, SIDE, SURROUNDINGS_SHARE, TEXTURE_MIN};
+use crate::joint::params::energy::{GAIN_MIN, SAME_RAD, SCALE_LIMITS, SIDE, SURROUNDINGS_SHARE, TEXTURE_MIN};
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
 
@@ -199,7 +199,7 @@ fn farther(one: Lanes, other: Lanes, lit: Lanes) -> Lanes {
 }
 
 /// Keeps the lower of two minima: the kept one, with the given scales, and the present one. The present unknowns become a mixture: the
-/// lower minimum, with the cells of the other one around which that has a lower energy. Gives whether there are such cells.
+/// lower minimum, with the cells of the other one around which that has a much lower energy. Gives whether there are such cells.
 fn keep_lower(tile: &mut Tile, kept: &mut Fields, scales: &Scales) -> bool {
     let found = tile.scales;
     let mut sign = 1.0;
@@ -227,8 +227,8 @@ fn excess(tile: &mut Tile, kept: &Fields, kept_scales: &Scales, scales: &[Scales
     vectors().map(|at| total(excess.get(at))).sum()
 }
 
-/// Turns the present unknowns into the kept ones, except in cells around which they differ and have a lower energy; gives whether there
-/// are any. Adds to the spread where both may be right. The excess of the kept ones stands in the first plane of the
+/// Turns the present unknowns into the kept ones, except in cells around which they differ and have a much lower energy; gives whether
+/// there are any. Adds to the spread where neither energy is much lower. The excess of the kept ones stands in the first plane of the
 /// product, times `sign`.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn mix_minima(tile: &mut Tile, kept: &Fields, sign: f32) -> bool {
@@ -251,7 +251,7 @@ fn mix_minima(tile: &mut Tile, kept: &Fields, sign: f32) -> bool {
     for at in vectors() {
         let (excess, mut around) = (excess.get(at), around.get(at));
         for x in 0..LANES {
-            around[x] = if around[x] > 0.5 && excess[x] > 0.0 { 1.0 } else { 0.0 };
+            around[x] = if around[x] > 0.5 && excess[x] > GAIN_MIN { 1.0 } else { 0.0 };
         }
         mixed += total(around);
         spare.set(at, around);
@@ -268,16 +268,15 @@ fn mix_minima(tile: &mut Tile, kept: &Fields, sign: f32) -> bool {
     mixed > 0.0
 }
 
-/// Adds the squared difference of two phases times the probability that the one with the higher energy is right (U19).
+/// Adds half the squared difference of two phases where neither has a much lower energy (U19).
 #[inline(always)]
 fn add_spread(excess: &Plane, phases: [&Plane; 2], spread: &mut Plane) {
     for at in vectors() {
         let (excess, mut out) = (excess.get(at), spread.get(at));
         let [one, other] = phases.map(|phase| phase.get(at));
         for x in 0..LANES {
-            // The excess is that by two sets of scales.
-            let probability = 1.0 / (1.0 + (0.5 * excess[x].abs()).exp());
-            out[x] += probability * (one[x] - other[x]).powi(2);
+            let half = 0.5 * (one[x] - other[x]) * (one[x] - other[x]);
+            out[x] += if excess[x].abs() < GAIN_MIN { half } else { 0.0 };
         }
         spread.set(at, out);
     }

@@ -148,3 +148,8 @@ pub const SAME_RAD: f32 = 0.02;
 /// starts at the true phase of the painted face has a higher energy than that of the first start).
 /// `python evaluation/sensitivity.py --only energy::SURROUNDINGS_SHARE`.
 pub const SURROUNDINGS_SHARE: f32 = 0.2;
+/// Least excess of the energy of the lower minimum of a tile over the other one, summed over 5 x 5 cells and over the scales of both, at
+/// which these cells take the other one in the mixture; a difference of 1 is a factor of e in probability. Below it, in either direction,
+/// the difference of the minima is uncertainty (U19). Larger: wrong minima stay. Smaller: where the model is wrong it decides by chance.
+/// `python evaluation/sensitivity.py --only energy::GAIN_MIN`.
+pub const GAIN_MIN: f32 = 30.0;

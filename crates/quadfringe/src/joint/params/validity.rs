@@ -10,15 +10,15 @@ pub const SAME_SURFACE_RAD: f32 = 0.3;
 /// [`MISFIT_MAX`], in units of the modulation, are added to it in squares. Larger: wrong orders. Smaller: fewer pixels. `python
 /// evaluation/sensitivity.py --only RESIDUAL_NOISES`.
 pub const RESIDUAL_NOISES_MAX: f32 = 2.0;
-/// Of nine pixels, see [`RESIDUAL_NOISES_MAX`]. Varied x0.7: wrong orders of steps 20 -> 10 ppm, of dim steps 190 -> 143 ppm, 0.4 points
-/// less of the textured face; x1.4: 49 and 256 ppm, 0.4 points more.
+/// Misfit of nine pixels in units of their modulation, see [`RESIDUAL_NOISES_MAX`]. Varied x0.7: wrong orders of steps 20 -> 10 ppm, of
+/// dim steps 190 -> 143 ppm, 0.4 points less of the textured face; x1.4: 49 and 256 ppm, 0.4 points more.
 pub const MISFIT_MAX: f32 = 0.28;
-/// Of a single pixel, also of one that region growing adds, see [`RESIDUAL_NOISES_MAX`]. The limit on nine pixels does not suffice,
-/// because a pixel in a narrow shadow is dim, and its residual is small compared with the light of its neighbours. Varied: no effect, but
-/// 0.05 points less of the textured face at x0.7. 0.35: 0.13 points less of the painted face, plate -4 %. With 0.35 for pixels that are
-/// added, 2.8 points less of photographs, 0.3 of the bottle and 0.4 of patches, whose RMS is 3 % less; with 0.6, 1.3 points more of
-/// photographs, and rods have 0.007 points more wrong orders (`python evaluation/world.py --half tune`, `python
-/// evaluation/captures_report.py`).
+/// Misfit of a single pixel in units of its modulation, see [`RESIDUAL_NOISES_MAX`]; it limits pixels that region growing adds, too. The
+/// limit on nine pixels does not suffice, because a pixel in a narrow shadow is dim, and its residual is small compared with the light of
+/// its neighbours. Varied: no effect, but 0.05 points less of the textured face at x0.7. 0.35: 0.13 points less of the painted face, plate
+/// -4 %. With 0.35 for pixels that are added, 2.8 points less of photographs, 0.3 of the bottle and 0.4 of patches, whose RMS is 3 % less;
+/// with 0.6, 1.3 points more of photographs, and rods have 0.007 points more wrong orders (`python evaluation/world.py --half tune`,
+/// `python evaluation/captures_report.py`).
 pub const PIXEL_MISFIT_MAX: f32 = 0.5;
 
 /// Least number of passed pixels in the 5 x 5 pixels around a pixel, including the pixel itself; a straight edge leaves 15 of
