@@ -6,19 +6,24 @@
 /// near edges of steps -17 %; x1.4, near edges of steps +27 %, of dim steps +10 %; otherwise no effect.
 pub const SAME_SURFACE_RAD: f32 = 0.3;
 
-/// Limit of the root mean square residual of a pixel, and of that over nine pixels, in units of the noise. [`PIXEL_MISFIT_MAX`] and
-/// [`MISFIT_MAX`], in units of the modulation, are added to it in squares. Larger: wrong orders. Smaller: fewer pixels. `python
-/// evaluation/sensitivity.py --only RESIDUAL_NOISES`.
-pub const RESIDUAL_NOISES_MAX: f32 = 2.0;
-/// Misfit of nine pixels in units of their modulation, see [`RESIDUAL_NOISES_MAX`]. Varied x0.7: wrong orders of steps 20 -> 10 ppm, of
-/// dim steps 190 -> 143 ppm, 0.4 points less of the textured face; x1.4: 49 and 256 ppm, 0.4 points more.
+/// Limit of the root mean square residual of a pixel and its neighbours, in units of the noise. [`MISFIT_MAX`], in
+/// units of the modulation, is added to it in squares. Larger: wrong orders (varied x1.4: dim steps 190 -> 288 ppm, 0.2
+/// points more of the textured face). Smaller: fewer pixels (x0.7: 112 ppm, 0.1 points less).
+pub const RESIDUAL_NOISES_MAX: f32 = 1.5;
+/// See [`RESIDUAL_NOISES_MAX`]. Varied x0.7: wrong orders of steps 20 -> 10 ppm, of dim steps 190 -> 143 ppm, 0.4 points less
+/// of the textured face; x1.4: 49 and 256 ppm, 0.4 points more.
 pub const MISFIT_MAX: f32 = 0.28;
-/// Misfit of a single pixel in units of its modulation, see [`RESIDUAL_NOISES_MAX`]; it limits pixels that region growing adds, too. The
-/// limit on nine pixels does not suffice, because a pixel in a narrow shadow is dim, and its residual is small compared with the light of
-/// its neighbours. Varied: no effect, but 0.05 points less of the textured face at x0.7. 0.35: 0.13 points less of the painted face, plate
-/// -4 %. With 0.35 for pixels that are added, 2.8 points less of photographs, 0.3 of the bottle and 0.4 of patches, whose RMS is 3 % less;
-/// with 0.6, 1.3 points more of photographs, and rods have 0.007 points more wrong orders (`python evaluation/world.py --half tune`,
-/// `python evaluation/captures_report.py`).
+
+/// Limit of the root mean square residual of a single pixel, in units of the noise. [`PIXEL_MISFIT_MAX`], in units of the
+/// modulation of the pixel, is added to it in squares. The limit on the neighbourhood does not suffice, because a pixel
+/// in a narrow shadow is dim, and its residual is small compared with the light of its neighbours. Varied x1.4: wrong
+/// orders of steps 20 -> 31 ppm; x0.7: dim steps 190 -> 173 ppm.
+pub const PIXEL_RESIDUAL_NOISES_MAX: f32 = 3.0;
+/// See [`PIXEL_RESIDUAL_NOISES_MAX`]. Varied: no effect, but 0.05 points less of the textured face at x0.7. 0.35: 0.13 points less
+/// of the painted face, plate -4 %. It also limits pixels that are added by region growing, together with [`RESIDUAL_NOISES_MAX`].
+/// With 0.35 for these alone, 2.8 points less of photographs, 0.3 of the bottle and 0.4 of patches, whose RMS is 3 % less; with 0.6,
+/// 1.3 points more of photographs, and rods have 0.007 points more wrong orders (`python evaluation/world.py --half tune`, `python
+/// evaluation/captures_report.py`).
 pub const PIXEL_MISFIT_MAX: f32 = 0.5;
 
 /// Least number of passed pixels in the 5 x 5 pixels around a pixel, including the pixel itself; a straight edge leaves 15 of
@@ -46,8 +51,9 @@ pub const FACING_REACH: usize = AMBIGUOUS_REACH + 1;
 /// clutter steps`).
 pub const CLOSE_TURNS_MAX: f32 = 1.5;
 
-/// Cells from such a step within which a region gives no order, as windows see both sides there. Larger: narrow objects with steps are
-/// lost. Smaller: strips of a wrong order are returned (`python evaluation/world.py --half tune --only rods clutter`).
+/// Cells from such a step within which a region gives no order: the reach of windows across a step, as
+/// [`PROPAGATION_CELLS`](super::uncertainty::PROPAGATION_CELLS). Larger: narrow objects with steps are lost. Smaller: strips of a wrong
+/// order are returned (`python evaluation/world.py --half tune --only rods clutter`).
 pub const CLOSE_CELLS: usize = 3;
 
 /// Number of rows from one that is compared for such steps to the next. Larger: steps of short edges are missed. Smaller: time. Not

@@ -5,7 +5,9 @@ use super::regrow::Consistent;
 use crate::Reason;
 use crate::decode::output::hole_unless;
 use crate::joint::neighbours::{around, sum_of_nine};
-use crate::joint::params::validity::{MISFIT_MAX, PIXEL_MISFIT_MAX, RESIDUAL_NOISES_MAX};
+use crate::joint::params::validity::{
+    MISFIT_MAX, PIXEL_MISFIT_MAX, PIXEL_RESIDUAL_NOISES_MAX, RESIDUAL_NOISES_MAX,
+};
 use crate::joint::scene::Scene;
 use multiversion::multiversion;
 
@@ -78,13 +80,14 @@ pub(super) fn check_row(
     let (quality, passed, consistent) =
         (&mut out.quality[..width], &mut out.passed[..width], &mut out.consistent[..width]);
     let reasons = &mut out.reasons[..width];
-    let noisy = (RESIDUAL_NOISES_MAX * limits.noise).powi(2);
+    let floors = [RESIDUAL_NOISES_MAX, PIXEL_RESIDUAL_NOISES_MAX]
+        .map(|most| (most * limits.noise) * (most * limits.noise));
     for x in 0..width {
         let lit = modulation[x] > 0.0;
         let share = MISFIT_MAX * modulation[x];
         let pixel_share = PIXEL_MISFIT_MAX * pixel_modulation[x];
-        let explained = here[x] <= noisy * noise[x] + pixel_share * pixel_share;
-        let agrees = explained & (near[x] <= 9.0 * (noisy * noise[x] + share * share));
+        let agrees = near[x] <= 9.0 * (floors[0] * noise[x] + share * share)
+            && here[x] <= floors[1] * noise[x] + pixel_share * pixel_share;
         // The energy has moved the phase too far for the pixel to pass by itself.
         let moved = reasons[x] == Reason::Misfit;
         quality[x] = order_quality[x] + hole_unless(lit | moved);
@@ -93,8 +96,9 @@ pub(super) fn check_row(
         passed[x] = u8::from(lit & certain & agrees & !apart);
         let open = lit & (reasons[x] == Reason::Returned);
         reasons[x] = if open { first_failure(apart, agrees, certain) } else { reasons[x] };
+        let explained = lit & (here[x] <= floors[0] * noise[x] + pixel_share * pixel_share);
         let by_surface = if certain & on_one_surface[x] { Consistent::BySurface } else { Consistent::No };
-        consistent[x] = if lit & explained { Consistent::ByLight } else { by_surface };
+        consistent[x] = if explained { Consistent::ByLight } else { by_surface };
     }
 }
 
