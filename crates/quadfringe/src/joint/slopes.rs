@@ -147,6 +147,26 @@ mod tests {
     use super::*;
 
     #[test]
+    fn slopes_of_a_wrapped_plane_are_exact_and_reach_beyond_the_lit_surface() {
+        let grid = Grid::new([96, 256], 4.0);
+        let phase: Vec<f32> = (0..grid.pixels())
+            .map(|i| wrap(0.25 * (i % grid.stride) as f32 - 0.1 * (i / grid.stride) as f32))
+            .collect();
+        // The surface is lit up to column 160. The window is 11 cells wide at each side.
+        let lit: Vec<f32> = (0..grid.pixels()).map(|i| f32::from(u8::from(i % grid.stride < 160))).collect();
+        let light = vec![0.5; grid.pixels()];
+        let scene =
+            Scene { light: [&light; 4], usable: &light, grid: &grid, period_px: 35.0, factor: 1, pair: None };
+        let mut slopes = Slopes::default();
+        slopes.measure(&scene, PhaseMap { phase: &phase, modulation: &lit }, &mut CellMaps::default());
+        for column in [4, 39, 44] {
+            let [along, down] = slopes.at(12, column);
+            assert!((along - 1.0).abs() < 1e-3 && (down + 0.4).abs() < 1e-3, "{column}: {along} {down}");
+        }
+        assert_eq!(slopes.at(12, 60), [0.0, 0.0]);
+    }
+
+    #[test]
     fn refined_slopes_follow_the_surface_and_stay_where_little_is_seen() {
         let grid = Grid::new([96, 256], 4.0);
         let wave = std::f32::consts::TAU / 50.0;
