@@ -8,8 +8,8 @@ from __future__ import annotations
 
 __all__: list[str] = []
 
-# --- Geometry: sound shots have shares of 0.00 and a median tilt of at most 13 degrees, mirrored ones a share of 1.00.
-# --- The published method, which keeps wrong orders, has shares up to 0.04, and a tilt up to 26 degrees at 5 % noise.
+# --- Geometry: sound shots have shares of 0.00, mirrored ones a share of 1.00.
+# --- The published method, which keeps wrong orders, has shares up to 0.04.
 
 # Samples along the shorter side of the image. More samples cost time in every decode, fewer miss small objects.
 SAMPLES = 48
@@ -32,9 +32,9 @@ SAMPLES_MIN, FINER = 100, 4
 # Rows beyond the image of the projector that are still possible, px. Follows from lens distortion, which calibrations
 # know to a few px at the border. A larger number misses small shifts of the rows.
 ROWS_PX = 8.0
-# Median angle in degrees between the surface and the line of sight from which a calibration is doubted. A projector
-# from another side has 61 or more, one whose z has the opposite sign 53. A smaller angle warns of objects that are
-# seen at a slant.
+# Angle in degrees between the normal of the surface as a whole and the line of sight from which a calibration is
+# doubted. A projector whose z has the opposite sign has 51, one with half of its focal length 70
+# (`pytest tests/test_wrong_calibration.py`). A smaller angle warns of objects that are seen at a slant.
 TILT_DEG = 45.0
 # Depth in medians from which a point counts as far: fringes there have a ninth of the light. Sound shots by the
 # published method, which keeps wrong orders, have a share of 0.01, a projector with half of its focal length has 0.08.

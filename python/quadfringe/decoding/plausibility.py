@@ -40,8 +40,8 @@ class Geometry:
 
     `backwards`: columns run against the direction that the calibration demands. `nowhere`: rays do not meet before the
     camera. `across`: columns grow along the other axis of the image. `outside`: points above or below the image of the
-    projector. `far`: points at several times the median depth. `tilt_deg`: median angle between surface and line of
-    sight. `depth_mm`: median.
+    projector. `far`: points at several times the median depth. `tilt_deg`: angle between the normal of the surface as a
+    whole and the line of sight. `depth_mm`: median.
     """
 
     backwards: float
@@ -227,8 +227,8 @@ def _impossible(found: Geometry) -> list[Cause]:
 
 def _doubtful(found: Geometry, calibration: Calibration) -> list[Cause]:
     if found.tilt_deg > params.TILT_DEG:
-        words = f"half of the surface is seen at more than {found.tilt_deg:.0f} degrees from its normal, which no "
-        words += "camera sees well: the calibration seems to be of another bench"
+        words = f"the surface as a whole is seen at {found.tilt_deg:.0f} degrees from its normal, which no camera sees "
+        words += "well: the calibration seems to be of another bench"
         return [Cause("calibration", words, CALIBRATE, fatal=False)]
     if found.far > params.WARNED_SHARE:
         words = f"{found.far:.0%} of the points are farther than {params.FAR_MEDIANS:g} times the median depth of "
@@ -253,15 +253,17 @@ def _growth(depth_mm: float, calibration: Calibration) -> tuple[float, float]:
 
 
 def _tilt_deg(points: NDArray[np.float32], right: NDArray[np.float32], below: NDArray[np.float32]) -> float:
-    """Give the median angle between the surface through three neighbours each and the line of sight."""
-    here, *others = (np.ascontiguousarray(np.moveaxis(each, -1, 0)) for each in (points, right, below))
-    (x, y, z), (rx, ry, rz), (dx, dy, dz) = here, *(other - here for other in others)
-    nx, ny, nz = ry * dz - rz * dy, rz * dx - rx * dz, rx * dy - ry * dx  # np.cross takes three times as long
-    with np.errstate(invalid="ignore", divide="ignore"):
-        lengths = np.sqrt(nx * nx + ny * ny + nz * nz) * np.sqrt(x * x + y * y + z * z)
-        cos = np.abs(nx * x + ny * y + nz * z) / lengths
-    known = np.isfinite(cos)
-    return float(np.degrees(np.arccos(np.clip(np.median(cos[known]), 0, 1)))) if known.any() else float("nan")
+    """Give the angle between the line of sight and the normal of the plane with the median slopes of the surface.
+
+    Noise tilts every part of a surface in another direction, and a wrong calibration all of it in the same one.
+    """
+    known = np.isfinite(points + right + below).all(-1)
+    if not known.any():
+        return float("nan")
+    here, along, down = (np.median(each[known], 0) for each in (points, right - points, below - points))
+    normal = np.cross(along, down)
+    cos = abs(normal @ here) / max(float(np.linalg.norm(normal) * np.linalg.norm(here)), 1e-30)
+    return float(np.degrees(np.arccos(min(cos, 1.0))))
 
 
 def _share(hits: NDArray[np.bool_], known: NDArray[np.bool_]) -> float:

@@ -13,8 +13,7 @@
 //! 8  orders of regions (J38); validity: doubtful pixels become no data         regions, validity
 //! 9  uncertainty, and the probability of a wrong order                         uncertainty; energy::variance
 //! 10 heights                                                             (S7)  decode::output, height
-//! 11 doubtful orders become as certain as their surface                        propagation
-//! 12 albedo of every pixel (optional)                                          albedo
+//! 11 albedo of every pixel (optional)                                          albedo
 //! ```
 //!
 //! The steps share the model of the intensities (`model`), a grid of cells for slowly varying quantities (`cells`), and the tuned
@@ -41,7 +40,6 @@ mod orders;
 mod params;
 mod phase;
 mod photometry;
-mod propagation;
 mod pyramid;
 mod reasons;
 mod regions;
@@ -73,7 +71,6 @@ use memory::OutputMemory;
 use motion::{Motion, Timing};
 use noise::least_modulation;
 use params::pyramid::{CELLS_PER_PERIOD, FACTOR_MAX};
-use propagation::Propagation;
 use pyramid::{Pyramid, Upsampler};
 use regions::RegionOrders;
 use results::Results;
@@ -100,7 +97,6 @@ pub(crate) struct Joint {
     pixels: Pixels,
     motion: Motion,
     validity: Validity,
-    propagation: Propagation,
     /// Wrong-order probability of every node.
     wrong_order: Vec<f32>,
     /// Working planes, for results that have no map that can serve as such.
@@ -124,7 +120,6 @@ impl Joint {
             pixels: Pixels::default(),
             motion: Motion::default(),
             validity: Validity::default(),
-            propagation: Propagation::default(),
             wrong_order: Vec::new(),
             spare: Vec::new(),
         }
@@ -172,8 +167,8 @@ impl Joint {
         // 9. Uncertainty and the probability of a wrong order. 10. Heights (S7).
         let noise = self.uncertainty(&frame);
         self.write(&frame, &noise, finish, out);
-        // 11. Doubtful orders. This follows step 10, which removes pixels outside the projector image. 12. Albedo.
-        self.complete(&frame, out);
+        // 11. Albedo.
+        self.write_albedo(&frame, out);
     }
 
     /// Step 1: linear light, and whether the shot was exposed too long.
@@ -250,18 +245,9 @@ impl Joint {
         found.write(&self.pyramid.full.scene(frame.full), noise, finish, out);
     }
 
-    /// Steps 11 and 12, on the maps that step 10 has written.
-    fn complete(&mut self, frame: &Frame<'_>, out: &mut Decoded) {
-        let maps = [&mut out.wrong_order_probability, &mut out.quality];
-        let [wrong_order, quality] = maps.map(|map| map.as_slice_mut().expect("checked layout"));
+    /// Step 11: the albedo of every pixel, if it is wanted.
+    fn write_albedo(&mut self, frame: &Frame<'_>, out: &mut Decoded) {
         let Self { pixels: Pixels { phase, .. }, validity, ratios, coarse, .. } = self;
-        let surfaces = propagation::Components {
-            grid: frame.full.grid,
-            phase,
-            components: &validity.components,
-            moved: coarse.orders.moved(),
-        };
-        self.propagation.run(surfaces, wrong_order, quality);
         if let Some(albedo) = &mut out.albedo {
             let known = Known { phase, valid: &validity.valid, ratios: *ratios, noise: coarse.noise };
             let (scene, out) = (self.pyramid.full.scene(frame.full), albedo.as_slice_mut());

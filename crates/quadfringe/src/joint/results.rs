@@ -3,6 +3,7 @@
 use super::cells::RowMaps;
 use super::energy::{self, Energy};
 use super::illumination::LitMask;
+use super::params::uncertainty::{GROWN_PROBABILITY_MIN, SETTLED_PROBABILITY_MIN};
 use super::reasons::Reasons;
 use super::regions::RegionOrders;
 use super::saturation::Saturation;
@@ -43,8 +44,13 @@ impl Results<'_> {
                 saturation.widen(scene, y, ratios, row.sigma);
                 let nodes = &wrong_order[y / grid.step * grid.columns..];
                 row.wrong.chunks_mut(grid.step).zip(nodes).for_each(|(wrong, node)| wrong.fill(*node));
+                let components = &validity.components[y * grid.stride..];
                 regions.parts(y, |pixels, found| {
-                    row.wrong[pixels].iter_mut().for_each(|wrong| *wrong = found.wrong_order(*wrong));
+                    for (wrong, component) in row.wrong[pixels.clone()].iter_mut().zip(&components[pixels]) {
+                        let grown = *component == validity::GROWN;
+                        let least = if grown { GROWN_PROBABILITY_MIN } else { SETTLED_PROBABILITY_MIN };
+                        *wrong = found.wrong_order(*wrong, least);
+                    }
                 });
                 finish.row(y, &mut row);
             },

@@ -1,4 +1,4 @@
-//! Step 12: the albedo of every pixel, which is its light without fringes.
+//! Step 11: the albedo of every pixel, which is its light without fringes.
 //!
 //! The energy gives albedo and contrast of cells of a few pixels. A pixel at an edge takes the albedo of the cells on its side
 //! (J30). What then differs from its light is texture or noise. Texture is a relative change of all channels in common, then of each

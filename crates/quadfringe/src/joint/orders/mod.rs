@@ -100,11 +100,6 @@ impl Orders {
         })
     }
 
-    /// Wrong-order probability of every node whose order was changed to continue a neighbour, 0 for the others; empty if none was.
-    pub fn moved(&self) -> &[f32] {
-        &self.surfaces.moved
-    }
-
     /// Wrong-order probability of every node.
     pub fn wrong_order_probability(&self, scene: &Scene<'_>, out: &mut Vec<f32>) {
         let grid = scene.grid;
@@ -115,7 +110,7 @@ impl Orders {
             let nodes = out.iter_mut().zip(self.verdicts(scene, row));
             nodes.for_each(|(out, verdict)| *out = model.probability(verdict));
         });
-        for (out, &moved) in out.iter_mut().zip(self.moved()) {
+        for (out, &moved) in out.iter_mut().zip(&self.surfaces.moved) {
             *out = if moved > 0.0 { moved } else { *out };
         }
     }

@@ -1,4 +1,4 @@
-//! Step 12: the albedo of every pixel.
+//! Step 11: the albedo of every pixel.
 
 /// Rows of the blocks, 16 pixels wide, in which the variance of the texture is estimated. Fewer: the estimate has more noise. More:
 /// noise returns farther around an edge. `pytest tests/test_albedo.py`.

@@ -7,9 +7,6 @@ pub const ROWS: usize = 32;
 /// As [`ROWS`] for the choice of places, which holds several rows of every place.
 pub const PLACE_ROWS: usize = 16;
 
-/// As [`ROWS`] for the propagation of probabilities, which also looks at rows within its reach.
-pub const PROPAGATION_ROWS: usize = 64;
-
 /// Number of columns of nodes that one task sweeps vertically. Their costs in one row are adjacent in memory. More: fewer
 /// tasks to share among threads. Time: `cargo bench -p quadfringe -- shot`.
 pub const SWEEP_COLUMNS: usize = 16;

@@ -46,17 +46,9 @@ pub const CELL_INFORMATION_MIN: f32 = 1e-9;
 /// exp(-80) is 2e-35.
 pub const EXPONENT_MAX: f32 = 80.0;
 
-/// A pixel is doubtful if its wrong-order probability exceeds this. Larger: more pixels keep the probability of a window across a
-/// discontinuity. Smaller: more take the floor below. Varied x1.4: the promised wrong orders of peaks rise from 48 to 59 ppm
-/// (`cargo test --test uncertainty`, before probabilities were calibrated).
-pub const DOUBTFUL: f32 = 0.001;
-/// A doubtful pixel may take its probability from a pixel up to this number of cells away, which is the reach of windows
-/// across a discontinuity. Varied (2 and 4): no effect.
-pub const PROPAGATION_CELLS: usize = 3;
-/// Least probability of a pixel whose order its component settles: the observed share of wrong orders, 0.0010 on the half `tune` of
-/// `python evaluation/world.py`, 0.0024 on seeds 5 to 11, and 0.0018 on the captures. Half and twice the value are half and twice
-/// what these pixels state.
-pub const SETTLED_PROBABILITY_MIN: f32 = 0.0015;
-/// The same for pixels that were added by region growing, because some of them belong to another surface: observed 0.015 on the half
-/// `tune` of `python evaluation/world.py`, 0.0094 on seeds 5 to 11, 0.043 on the captures.
+/// Least probability of a pixel whose order its region settles: the observed share of wrong orders, 0.0021 on the half `tune` of
+/// `python evaluation/world.py`. Half and twice the value are half and twice what these pixels state.
+pub const SETTLED_PROBABILITY_MIN: f32 = 0.0025;
+/// The same for pixels that were added by region growing, because some of them belong to another surface: observed 0.016 on the half
+/// `tune` of `python evaluation/world.py`.
 pub const GROWN_PROBABILITY_MIN: f32 = 0.02;

@@ -51,9 +51,8 @@ pub const FACING_REACH: usize = AMBIGUOUS_REACH + 1;
 /// clutter steps`).
 pub const CLOSE_TURNS_MAX: f32 = 1.5;
 
-/// Cells from such a step within which a region gives no order: the reach of windows across a step, as
-/// [`PROPAGATION_CELLS`](super::uncertainty::PROPAGATION_CELLS). Larger: narrow objects with steps are lost. Smaller: strips of a wrong
-/// order are returned (`python evaluation/world.py --half tune --only rods clutter`).
+/// Cells from such a step within which a region gives no order, as windows see both sides there. Larger: narrow objects with steps are
+/// lost. Smaller: strips of a wrong order are returned (`python evaluation/world.py --half tune --only rods clutter`).
 pub const CLOSE_CELLS: usize = 3;
 
 /// Number of rows from one that is compared for such steps to the next. Larger: steps of short edges are missed. Smaller: time. Not

@@ -8,20 +8,19 @@
 
 mod scores;
 mod sums;
+mod verdict;
 
 use super::connected::Regions;
-use super::params::regions::{
-    CERTAIN_EVIDENCE, CONTRADICTION_MAX, QUALITY, ROW_STEP, SHARED_PX, TILE_MIN_PX, TILE_SIDE,
-};
-use super::params::uncertainty::SETTLED_PROBABILITY_MIN;
+use super::params::regions::{ROW_STEP, SHARED_PX, TILE_MIN_PX, TILE_SIDE};
 use super::scene::Scene;
 use crate::encoding::{Channel, FourChannel};
 use crate::parallel::slots::Slots;
 use rayon::prelude::*;
-use scores::{Choice, Contradiction, Scorer, Shifts};
+use scores::{Choice, Scorer, Shifts};
 use std::f32::consts::TAU;
 use std::ops::Range;
 use sums::{Brightness, RowTerms, Sums};
+use verdict::Verdict;
 
 /// The orders of the regions of a shot, with working memory.
 #[derive(Debug)]
@@ -59,47 +58,6 @@ struct Part {
     phase: f32,
     /// Index of its first score.
     scores: usize,
-}
-
-/// The order of a part of a region, and the evidence for and against it. All evidence is a log-likelihood ratio.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Verdict {
-    region: u32,
-    /// Turns that it lacks.
-    turns: f32,
-    /// Evidence for this number of turns against all others; 0 if the part alone speaks for another.
-    lead: f32,
-    /// Evidence for shifts of G and IR that no number of turns explains.
-    contradiction: Contradiction,
-}
-
-impl Verdict {
-    /// Raises the quality of orders, which the nodes have given, to what the region gives with this `support` by the neighbourhood:
-    /// where that is lower, another surface is near. An order that is not that of the nodes has the quality of the region.
-    pub fn raise(&self, support: &[f32], quality: &mut [f32]) {
-        let most = QUALITY * (self.evidence() / CERTAIN_EVIDENCE).clamp(0.0, 1.0);
-        let of_nodes = if self.is_of_nodes() { 1.0 } else { 0.0 };
-        for (quality, support) in quality.iter_mut().zip(support) {
-            *quality = (of_nodes * *quality).max(support.min(most));
-        }
-    }
-
-    /// Probability that the order is wrong; that of the nodes is wrong with probability `of_nodes`. A region says nothing of pixels at
-    /// its border, so that it makes no pixel more certain than its nodes do.
-    pub fn wrong_order(&self, of_nodes: f32) -> f32 {
-        let by_region = (1.0 / (1.0 + self.evidence().exp())).max(SETTLED_PROBABILITY_MIN);
-        if self.is_of_nodes() { of_nodes } else { of_nodes.max(by_region) }
-    }
-
-    /// Evidence for its order.
-    fn evidence(&self) -> f32 {
-        if self.contradiction.whole > CONTRADICTION_MAX { 0.0 } else { self.lead - self.contradiction.whole }
-    }
-
-    /// Whether it has the order that its nodes have, and nothing contradicts it.
-    fn is_of_nodes(&self) -> bool {
-        self.turns == 0.0 && self.contradiction.of_order <= CONTRADICTION_MAX
-    }
 }
 
 impl RegionOrders {
@@ -145,6 +103,7 @@ impl RegionOrders {
         self.measure(scene, &scorer, brightness, phase);
         self.choose(&scorer);
         self.judge(&scorer);
+        self.look_around();
         let this = &*self;
         phase.par_chunks_mut(grid.stride).enumerate().filter(|(y, _)| this.is_wrong(*y)).for_each(
             |(y, phase)| {
@@ -250,10 +209,28 @@ impl RegionOrders {
                         });
                     }
                     let Choice { turns, lead } = *choice;
-                    Verdict { region: part.region, turns, lead, contradiction: scorer.contradiction(shifts) }
+                    let contradiction = scorer.contradiction(shifts);
+                    Verdict { region: part.region, turns, lead, contradiction, around: 0.0 }
                 }));
             }
         });
+    }
+
+    /// Takes the greatest evidence for the order of every part from the parts of its region around it. Near its border a part may be too
+    /// small to have any.
+    fn look_around(&mut self) {
+        for row in 0..self.found.len() {
+            for column in 0..self.found[row].len() {
+                for part in 0..self.found[row][column].len() {
+                    let Verdict { region, turns, .. } = self.found[row][column][part];
+                    let near = around(row, column, self.found.len(), self.found[row].len());
+                    let near = near.flat_map(|[y, x]| &self.found[y][x]);
+                    let alike = near.filter(|near| near.region == region && near.turns == turns);
+                    let most = alike.map(Verdict::evidence).fold(0.0, f32::max);
+                    self.found[row][column][part].around = most;
+                }
+            }
+        }
     }
 }
 

@@ -2,6 +2,7 @@ use super::super::cells::Grid;
 use super::*;
 use crate::encoding::Encoding;
 use crate::joint::energy::Rows;
+use crate::joint::params::regions::QUALITY;
 
 const PERIOD_PX: f32 = 24.0;
 const SIDES: [usize; 2] = [96, 192];
