@@ -173,10 +173,10 @@ impl Joint {
 
     /// Step 1: linear light, and whether the shot was exposed too long.
     fn linearise<T: Sample>(&mut self, plan: &Plan, shot: &Shot<'_, T>) {
-        let Self { shape, ratios, pyramid, saturation, pixels, .. } = self;
+        let Self { shape, stride, ratios, pyramid, saturation, pixels, .. } = self;
         let marks = Marks { saturated: &mut saturation.saturated, reasons: &mut pixels.reasons };
         linear_light(plan, shot, *shape, *ratios, &mut pyramid.full, marks);
-        saturation.judge(&pyramid.full.light, *ratios);
+        saturation.judge(&pyramid.full.light, *stride, *ratios);
     }
 
     /// Step 6: the minimum of the energy, with this `detail`.

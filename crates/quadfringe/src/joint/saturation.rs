@@ -7,7 +7,9 @@
 use super::cells::RowMaps;
 use super::infrared::{Waves, with_waves};
 use super::model::{FringeRows, count};
-use super::params::saturation::{BRIGHT_MIN, CHANNEL_SHARE_MAX, CHANNELS_MIN, GAIN, RESTORED_MAX, SHARE_MIN};
+use super::params::saturation::{
+    BRIGHT_MIN, CHANNEL_SHARE_MAX, CHANNELS_MIN, GAIN, RESTORED_MAX, SHARE_MIN, TILE_PX,
+};
 use super::photometry::Photometry;
 use super::pyramid::Level;
 use super::scene::{PhaseMap, ScaledGrid, Scene};
@@ -29,27 +31,31 @@ pub(super) struct Saturation {
 }
 
 impl Saturation {
-    /// Decides whether a shot is restored: whether enough of its bright pixels have a saturated channel and others that are not,
-    /// and no channel is saturated nearly everywhere.
-    pub fn judge(&mut self, light: &[Vec<f32>; 4], ratios: [f32; 4]) {
-        let channels = count(ratios);
+    /// Decides whether a shot is restored: whether somewhere many pixels side by side have a saturated channel and others that are
+    /// not, and no channel is saturated in nearly all bright pixels.
+    pub fn judge(&mut self, light: &[Vec<f32>; 4], stride: usize, ratios: [f32; 4]) {
+        let bands = self.saturated.par_chunks(TILE_PX * stride);
+        let cut =
+            bands.any(|band| (0..stride).step_by(TILE_PX).any(|left| is_cut(band, stride, left, ratios)));
+        self.restores = cut && !self.is_blind(light);
+        self.moved.clear();
+    }
+
+    /// Whether a channel is saturated in nearly all bright pixels.
+    fn is_blind(&self, light: &[Vec<f32>; 4]) -> bool {
         let [red, green, blue, infrared] = light.each_ref().map(|plane| plane.par_iter());
         let pixels = red.zip(green).zip(blue.zip(infrared)).zip(&self.saturated);
-        // Bright pixels, those of them that can be restored, and those whose R, G, B, IR is saturated.
-        let [bright, restorable, by_channel @ ..]: [u64; 6] = pixels
+        // Bright pixels, and those of them whose R, G, B, IR is saturated.
+        let [bright, by_channel @ ..]: [u64; 5] = pixels
             .filter(|(((red, green), (blue, infrared)), _)| {
                 red.max(**green).max(**blue).max(**infrared) > BRIGHT_MIN
             })
             .map(|(_, saturated)| {
-                let cut = (saturated.count() > 0) & (channels - saturated.count() as f32 >= CHANNELS_MIN);
                 let [red, green, blue, infrared] = [0, 1, 2, 3].map(|c| u64::from(saturated.has(c)));
-                [1, u64::from(cut), red, green, blue, infrared]
+                [1, red, green, blue, infrared]
             })
-            .reduce(|| [0; 6], |sums, more| std::array::from_fn(|k| sums[k] + more[k]));
-        let most = CHANNEL_SHARE_MAX * bright as f64;
-        self.restores = restorable as f64 > SHARE_MIN * bright as f64
-            && by_channel.iter().all(|&saturated| saturated as f64 <= most);
-        self.moved.clear();
+            .reduce(|| [0; 5], |sums, more| std::array::from_fn(|k| sums[k] + more[k]));
+        by_channel.iter().any(|&saturated| saturated as f64 > CHANNEL_SHARE_MAX * bright as f64)
     }
 
     /// Writes the masks with which steps 2 to 6 begin, and the reasons why pixels take no part. What other steps have found is
@@ -146,6 +152,15 @@ impl Saturation {
             with_waves!(scene, y, ratios, |waves| row.restore(waves, [red, green, blue, infrared]));
         });
     }
+}
+
+/// Whether many pixels of a tile have a saturated channel and enough others: the tile of a band of rows at column `left`.
+fn is_cut(band: &[Saturated], stride: usize, left: usize, ratios: [f32; 4]) -> bool {
+    let restorable = |saturated: &&Saturated| {
+        (saturated.count() > 0) & (count(ratios) - saturated.count() as f32 >= CHANNELS_MIN)
+    };
+    let pixels = band.chunks(stride).flat_map(|row| &row[left..(left + TILE_PX).min(stride)]);
+    pixels.filter(restorable).count() as f64 > SHARE_MIN * (TILE_PX * TILE_PX) as f64
 }
 
 /// What is known of a row of pixels.
@@ -249,23 +264,24 @@ mod tests {
         assert_eq!(reasons[..6], [yes, no, no, no, no, unseen]);
     }
 
+    /// Whether a shot of 64 x 64 pixels is restored in which the pixels `[x, y]` that `is` selects have saturated `channels`.
+    fn restores(channels: [bool; 4], is: fn([usize; 2]) -> bool) -> bool {
+        let marked = |i: usize| is([i % WIDTH, i / WIDTH]);
+        let saturated =
+            (0..WIDTH * WIDTH).map(|i| Saturated::new(channels.map(|channel| channel & marked(i))));
+        let mut saturation = Saturation { saturated: saturated.collect(), ..Default::default() };
+        saturation.judge(&[(); 4].map(|()| vec![0.5; WIDTH * WIDTH]), WIDTH, RATIOS);
+        saturation.restores
+    }
+
     #[test]
-    fn saturation_by_noise_alone_restores_nothing() {
-        let mut saturation = Saturation { saturated: vec![Saturated::default(); 100], ..Default::default() };
-        let mut light = [(); 4].map(|()| vec![0.5; 100]);
-        saturation.saturated[..5].fill(Saturated::new([true, false, false, false]));
-        saturation.judge(&light, RATIOS);
-        assert!(!saturation.restores);
-        // Pixels without light do not count, nor does glare.
-        light.iter_mut().for_each(|plane| plane[50..].fill(0.0));
-        saturation.judge(&light, RATIOS);
-        assert!(saturation.restores);
-        saturation.saturated[..5].fill(Saturated::new([true; 4]));
-        saturation.judge(&light, RATIOS);
-        assert!(!saturation.restores);
-        // A channel without fringes cannot be restored.
-        saturation.saturated.fill(Saturated::new([true, false, false, false]));
-        saturation.judge(&light, RATIOS);
-        assert!(!saturation.restores);
+    fn highlights_are_restored_but_not_what_noise_saturates() {
+        let red = [true, false, false, false];
+        assert!(restores(red, |[x, y]| x < 20 && y < 20));
+        // As many pixels all over the shot.
+        assert!(!restores(red, |[x, y]| (7 * x + 3 * y) % 10 == 0));
+        // Glare in all channels tells nothing, and a channel without fringes cannot be restored.
+        assert!(!restores([true; 4], |[x, y]| x < 20 && y < 20));
+        assert!(!restores(red, |_| true));
     }
 }
