@@ -5,6 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
+from support.bars import hold
 
 from quadfringe.evaluation._print_relief import bent, fitted
 
@@ -22,9 +23,8 @@ def test_the_spot_of_a_pixel_is_found_from_the_relief_of_print(spot_px: float) -
     difference = np.angle(wave * np.exp(-1j * phase))
     inner = np.s_[10:-10, 10:-10]
     found = fitted(bent(np.abs(wave), phase)[0][inner], difference[inner])
-    assert found.spot_px == pytest.approx(spot_px, rel=0.1)
-    assert found.explained > 0.97
-    assert found.rms_rad > 0.01
+    hold("print_relief.spot", found.spot_px / spot_px)
+    hold("print_relief.explained_percent", 100 * found.explained)
 
 
 def test_a_relief_of_the_other_sign_is_not_explained() -> None:
