@@ -2,43 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import pytest
 
 import quadfringe as qf
-from quadfringe import _core
-from quadfringe.data import core_device
 from quadfringe.doctor import Finding, examine_shot
-from quadfringe.evaluation import world
-from quadfringe.evaluation._isolated import outline
-from quadfringe.evaluation.broken import HALF, NOISE, _stray
-
-SIZES = {"half": _core.Bench(camera=core_device(HALF)), "full": _core.Bench()}
+from quadfringe.evaluation import broken
 
 
-def exposed(scene: str, seed: int, size: str = "half", **options: Any) -> qf.Shot:
-    drawn = world.SCENES[scene](SIZES[size], np.random.default_rng([seed, 77]))
-    drawn = replace(drawn, options=(drawn.options or {}) | options)
-    return world.expose(SIZES[size], drawn, seed, NOISE).shot
-
-
-def cut_out(shot: qf.Shot, fill: float, seed: int) -> qf.Shot:
-    """Leave an object that fills this share of the frame, on black."""
-    inside, noise = outline(shot.first.shape, fill, seed), np.random.default_rng(seed)
-    black = [np.clip(np.round(noise.normal(1, 2, inside.shape)), 0, 255) for _ in shot.channels]
-    parts = zip(shot.channels.values(), black, strict=True)
-    return qf.Shot(*(np.where(inside, image, dark).astype(np.uint8) for image, dark in parts))
+def exposed(scene: str, seed: int, *, half: bool = True, **options: Any) -> qf.Shot:
+    return broken.exposed(scene, seed, broken.Fault("", options), half=half)
 
 
 def findings(shot: qf.Shot) -> list[Finding]:
     with qf.open() as scanner:
         calibration = scanner.calibration
     assert calibration is not None
-    if shot.first.shape == (HALF.height_px, HALF.width_px):
-        calibration = calibration.model_copy(update={"camera": HALF})
+    if shot.first.shape == (broken.HALF.height_px, broken.HALF.width_px):
+        calibration = calibration.model_copy(update={"camera": broken.HALF})
     return [one for one in examine_shot(shot, qf.Plan(912, calibration=calibration)) if one.grade != "good"]
 
 
@@ -53,7 +35,7 @@ def named(shot: qf.Shot) -> list[str]:
 @pytest.mark.parametrize(("scene", "fill", "seed"), [("face", 0.04, 62), ("face", 0.12, 61), ("painted_face", 0.2, 62)])
 def test_a_sound_narrow_object_has_no_fault(scene: str, fill: float, seed: int) -> None:
     """Across three fringes 36, 35 and 30 are nearly alike, so that the fit may take any for another."""
-    found = findings(cut_out(exposed(scene, 31, "full"), fill, seed))
+    found = findings(broken.cut_out(exposed(scene, 31, half=False), fill, seed))
     assert [one for one in found if one.grade == "fault"] == []
     (told,) = (one for one in found if one.name == "crosstalk")
     assert (told.grade, "cannot be measured" in told.found) == ("note", True)
@@ -61,15 +43,14 @@ def test_a_sound_narrow_object_has_no_fault(scene: str, fill: float, seed: int) 
 
 @pytest.mark.parametrize(("pair", "words"), [((1, 3), "green sees 1"), ((0, 1), "red sees 1")])
 def test_crosstalk_on_a_narrow_object_is_told(pair: tuple[int, int], words: str) -> None:
-    first, *_ = findings(cut_out(exposed("sphere", 31, "full", **_stray({pair: 0.2})), 0.08, 61))
+    first, *_ = findings(broken.cut_out(exposed("sphere", 31, half=False, **broken.stray({pair: 0.2})), 0.08, 61))
     assert (first.name, first.grade) == ("crosstalk", "fault")
     assert first.found.startswith(words)
 
 
 def test_a_small_painted_object_is_not_called_dark() -> None:
-    assert not any(
-        name.startswith("brightness") for name in named(cut_out(exposed("painted_face", 31, "full"), 0.02, 61))
-    )
+    small = broken.cut_out(exposed("painted_face", 31, half=False), 0.02, 61)
+    assert not any(name.startswith("brightness") for name in named(small))
 
 
 # The projectors have not moved
@@ -83,7 +64,7 @@ def test_print_that_differs_between_channels_is_no_moved_projector(scene: str) -
 
 @pytest.mark.parametrize(("scene", "pair"), [("clutter", (1, 2)), ("coin", (0, 1)), ("glossy_face", (0, 1))])
 def test_crosstalk_is_no_moved_projector(scene: str, pair: tuple[int, int]) -> None:
-    told = named(exposed(scene, 9, **_stray({pair: 0.25})))
+    told = named(exposed(scene, 9, **broken.stray({pair: 0.25})))
     assert told[0] == "crosstalk"
     assert "coaxial pair" not in told
 
@@ -93,16 +74,16 @@ def test_crosstalk_is_no_moved_projector(scene: str, pair: tuple[int, int]) -> N
 
 @pytest.mark.parametrize("scene", ["glossy_face", "glossy_sphere"])
 def test_blur_is_named_in_spite_of_a_highlight(scene: str) -> None:
-    assert named(exposed(scene, 11, "full", blur_px=5.0))[0] == "blur"
+    assert named(exposed(scene, 11, half=False, blur_px=5.0))[0] == "blur"
 
 
 @pytest.mark.parametrize("scene", ["coin", "plane"])
 def test_crosstalk_of_one_channel_is_not_called_blur(scene: str) -> None:
-    told = named(exposed(scene, 11, **_stray({(0, 1): 0.4})))
+    told = named(exposed(scene, 11, **broken.stray({(0, 1): 0.4})))
     assert told[0] == "crosstalk"
     assert "blur" not in told
 
 
 @pytest.mark.parametrize(("scene", "exponent"), [("coin", 3.0), ("coin", 2.6), ("plane", 3.0)])
 def test_a_strong_response_is_not_called_a_shift_of_infrared(scene: str, exponent: float) -> None:
-    assert named(exposed(scene, 11, "full", projector_exponent=(exponent,) * 4))[0] == "response"
+    assert named(exposed(scene, 11, half=False, projector_exponent=(exponent,) * 4))[0] == "response"
