@@ -16,7 +16,7 @@ import quadfringe as qf
 from quadfringe import _core
 from quadfringe.decoding import params
 from quadfringe.decoding.channel_offsets import Offsets, _in_part, contradiction, offsets_of
-from quadfringe.decoding.fringe_fit import infrared_drift
+from quadfringe.decoding.pair_drift import infrared_drift
 from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import world
 from quadfringe.evaluation._variants import stepped

@@ -12,7 +12,8 @@ import numpy as np
 
 from quadfringe import _core
 from quadfringe.data import AnyShot, Shape
-from quadfringe.decoding import params, symptoms
+from quadfringe.decoding import fit_params, params, symptoms
+from quadfringe.decoding.blur import blur
 from quadfringe.decoding.cause import Cause
 from quadfringe.decoding.fringe_fit import Fit, fit_fringes
 from quadfringe.decoding.plan import Plan
@@ -24,7 +25,6 @@ __all__ = [
     "after_order",
     "along_rows",
     "before_order",
-    "blur",
     "channels_fit",
     "family",
     "listed",
@@ -33,7 +33,6 @@ __all__ = [
     "registration",
     "strange",
     "too_bright",
-    "vanishing",
     "wrong_bits",
     "wrong_numbers",
     "wrong_order_rad",
@@ -45,7 +44,6 @@ FringeNumbers = tuple[float, ...]
 FEW_LIT = 0.1
 NUMBERS_FIX = "give the numbers that were projected (--fringes), or project these"
 TURN_FIX = "turn the images, or the camera, by 90 degrees, or decode with the joint method (--method joint)"
-FOCUS = "focus the camera and the projectors on the object, close the aperture, and hold the object still"
 SMALLEST_ROOT, LARGEST_ROOT = 4, 12  # 16, 15, 12 and 144, 143, 132: coarser or finer fringes measure nothing
 SMALLEST_PAIR, LARGEST_PAIR = 6, 20  # N, N - 1 without infrared: finer fringes look alike after one of them
 
@@ -98,12 +96,12 @@ def along_rows(shot: AnyShot, plan: Plan) -> Cause | None:
 
 def channels_fit(closure: Closure | None) -> bool:
     """Say whether every channel has the frequency of its fringe number, and red and blue are in order."""
-    return closure is not None and closure.angle.agreement > params.AGREEMENT_MIN and _off(closure) < params.RATIO_OFF
+    return closure is not None and closure.angle.agreement > params.AGREEMENT_MIN and closure.off < params.RATIO_OFF
 
 
 def strange(closure: Closure | None) -> bool:
     """Say whether a channel has a frequency that no other fringe numbers explain, as an exchanged one has."""
-    return closure is not None and _off(closure) >= params.RATIO_STRANGE
+    return closure is not None and closure.off >= params.RATIO_STRANGE
 
 
 def wrong_bits(shot: AnyShot) -> Cause | None:
@@ -168,7 +166,7 @@ def wrong_numbers(plan: Plan, closure: Closure | None) -> Cause | None:
     """Find fringes whose ratios are not those of the fringe numbers, and the numbers that fit."""
     if closure is None or closure.angle.agreement < params.AGREEMENT_MIN:
         return None
-    if not params.RATIO_OFF < _off(closure) < params.RATIO_STRANGE:
+    if not params.RATIO_OFF < closure.off < params.RATIO_STRANGE:
         return None
     first, second, *others = plan.fringes.numbers
     words = f"the fringe numbers {listed(plan.fringes.numbers)} are not those of this shot: for {first:g} fringes of "
@@ -221,47 +219,6 @@ def listed(numbers: FringeNumbers) -> str:
     return ", ".join(f"{number:g}" for number in numbers)
 
 
-def _off(closure: Closure) -> float:
-    return max(abs(closure.green - 1), abs(closure.infrared - 1))
-
-
-def blur(shot: AnyShot, fit: Fit | None, plan: Plan, closure: Closure | None) -> Cause | None:
-    """Find blur: weak fringes, weaker the finer they are, in images without sharp detail; or fringes that vanish."""
-    return _measured_blur(shot, fit, plan, closure) or vanishing(shot, plan)
-
-
-def vanishing(shot: AnyShot, plan: Plan) -> Cause | None:
-    """Find a blur as wide as the fringes, which leaves little of them and no edge of the object sharp."""
-    contrast = symptoms.coarse_contrast(shot, plan)
-    if contrast > params.VANISHING_CONTRAST or symptoms.fine_over_coarse(shot) > params.UNSHARP:
-        return None
-    words = f"the images are so blurred that the fringes nearly vanish: their contrast is at most {contrast:.0%}, and "
-    return Cause("blur", words + "no edge is sharp", FOCUS)
-
-
-def _measured_blur(shot: AnyShot, fit: Fit | None, plan: Plan, closure: Closure | None) -> Cause | None:
-    """Find the blur that the contrasts of fine and coarse fringes show together.
-
-    Without infrared all fringes are about equally fine, and nothing is found.
-    """
-    if fit is None or closure is None or not plan.fringes.infrared or strange(closure):
-        return None
-    red, _, blue, ir = (float(value) for value in fit.contrast)
-    visible = float(np.sqrt(red * blue))
-    if visible > params.BLURRED_CONTRAST or symptoms.sharpness(shot) > params.SHARP_MIN:
-        return None
-    coarse_px = closure.infrared_px
-    fine_px = coarse_px * plan.fringes.numbers[2] / plan.fringes.numbers[0]
-    lost = np.log(max(ir, 1e-3) / max(visible, 1e-3)) / (2 * np.pi**2 * (fine_px**-2 - coarse_px**-2))
-    sigma_px = float(np.sqrt(max(lost, 0.0)))
-    if sigma_px < params.BLUR_PX:
-        return None
-    # Full fringes cannot have lost more than this; the ratio is off where wrong orders weaken the infrared waves.
-    sigma_px = min(sigma_px, float(np.sqrt(-np.log(max(visible, 1e-3)) / 2)) / np.pi * fine_px)
-    words = f"the images are blurred by about {sigma_px:.1f} px: the contrast is {visible:.0%} for the finest fringes "
-    return Cause("blur", words + f"and {ir:.0%} for the coarsest, and no detail is sharp", FOCUS)
-
-
 def _too_dark(shot: AnyShot, least: float) -> Cause | None:
     top = max(symptoms.brightness(shot).values())
     if top >= least:
@@ -280,8 +237,9 @@ def too_bright(shot: AnyShot) -> Cause | None:
 
 
 def _not_linear(fit: Fit) -> Cause | None:
-    value = float(max(fit.harmonic[0], fit.harmonic[2]))
-    if value < params.HARMONIC:
+    sure = np.where(fit.harmonic_least > fit_params.SOUND, fit.harmonic, 0)
+    value = float(max(sure[0], sure[2]))
+    if value < fit_params.HARMONIC:
         return None
     words = f"the light is not linear: the second harmonic of red or blue is {value:.0%} of the first"
     fix = "switch off the gamma table of the projector, or calibrate it: quadfringe calibrate response"
@@ -289,8 +247,8 @@ def _not_linear(fit: Fit) -> Cause | None:
 
 
 def _crosstalk(fit: Fit) -> Cause | None:
-    to, of, value = fit.worst_stray
-    if value < params.STRAY:
+    to, of, value, least = fit.worst_stray
+    if value < fit_params.STRAY or least < fit_params.SOUND:
         return None
     words = f"channels see one another: {to} sees {value:.0%} of the fringes of {of}"
     return Cause("crosstalk", words, "add band-pass filters, or calibrate crosstalk: quadfringe calibrate, step levels")

@@ -30,10 +30,10 @@ from quadfringe.decoding.causes import NUMBERS_FIX, family, listed, registration
 from quadfringe.decoding.fringe_fit import infrared_column
 from quadfringe.decoding.plan import Plan
 from quadfringe.decoding.readings import rows_of
-from quadfringe.decoding.symptoms import closing_steps, closure_of, linear_light_of
+from quadfringe.decoding.symptoms import Angle, Closure, closing_steps, closure_of, linear_light_of
 from quadfringe.decoding.trusted import take_out, trusted_part
 
-__all__ = ["Offsets", "contradiction", "drifting", "offsets_of", "taken_out"]
+__all__ = ["Offsets", "contradiction", "decoded_closure", "drifting", "offsets_of", "taken_out"]
 
 UNCOVER_FIX = "keep what covers or moves a part of the infrared image out of its way"
 CONTRADICTED_FIX = (
@@ -84,6 +84,21 @@ def contradiction(shape: Shape, shot: AnyShot, plan: Plan) -> Cause | None:
         # If nothing fits, it is no part, and a response or crosstalk moves the fringes as well.
         return shifted if part.fatal else part
     return shifted and _where_it_fits(shifted, shape, shot, plan)
+
+
+def decoded_closure(closure: Closure | None, shape: Shape, shot: AnyShot, plan: Plan) -> Closure | None:
+    """Give a closure with the angle that the decoded phase shows, if enough of it is decoded.
+
+    A strong response bends the phase of red and blue as it is read from their light, and k - 1 times that turns the
+    closure by anything. Offsets from the decoded phase are those of the fringes, without their harmonics.
+    """
+    if closure is None or len(plan.fringes.numbers) < 3:
+        return closure
+    offsets = offsets_of(shape, shot, plan).closure_rad(plan.fringes.numbers)
+    if offsets.size < params.OFFSET_TILES_MIN:
+        return closure
+    mean = _mean(offsets)
+    return replace(closure, angle=Angle(float(np.angle(mean)), closure.angle.agreement, abs(mean)))
 
 
 def taken_out(shape: Shape, shot: AnyShot, plan: Plan, seen: Shape) -> Cause | None:

@@ -1,46 +1,52 @@
-"""Amplitude, contrast, harmonics and crosstalk of the fringes of a decoded shot, and drift of the infrared fringes.
+"""Amplitude, contrast, harmonics and crosstalk of the fringes of a decoded shot.
 
 With the absolute phase known at every pixel, each channel is a sum of known waves: its fringes, their second harmonic
 (a non-linear response) and the fringes of the other channels (crosstalk). Least squares over the whole image gives
-their amplitudes; over the image, even 36 and 35 fringes are nearly orthogonal.
+their amplitudes. Over a whole field 36 and 35 fringes are nearly orthogonal; across an object of a few fringes they are
+nearly the same, so that every ratio comes with the least value that it has for sure.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.config import Device
 from quadfringe.data import AnyShot, Shape
+from quadfringe.decoding import fit_params
+from quadfringe.decoding.jackknife import Jackknife, normal_equations, tiles_of
 from quadfringe.decoding.plan import Plan
 from quadfringe.decoding.stages import carrier
 from quadfringe.decoding.symptoms import linear_light_of
 
-__all__ = ["Drift", "Fit", "fit_fringes", "infrared_column", "infrared_drift", "pixels_of"]
+__all__ = [
+    "Fit",
+    "Waves",
+    "expected_column",
+    "fit_fringes",
+    "infrared_column",
+    "pixels_of",
+    "relative_waves",
+    "shown_waves",
+]
 
 Map = NDArray[np.float32]
+Wave = NDArray[np.float64]
 Real = TypeVar("Real", np.float32, np.float64)
 # Checked by pytest tests/test_doctor.py on shots with known defects.
 PIXELS_MIN = 5000  # pixels with fringes, below which amplitudes are not estimated
-TILE_PX = 96  # side of a tile: several fringes, so that the offset of a tile averages the noise
-TILE_SHARE = 0.3  # share of a tile that must carry fringes
-TILES_MIN = 2
-SHIFT_MAX = 6  # largest order error that is considered, fringes
-# Of the tiles: a projector that has moved moves the fringes in all of them, while printed edges move single tiles. A
-# larger quantile takes coloured squares for drift: 2.7 px in one tile of twenty, 0.2 px in three quarters of the tiles
-# (`python evaluation/diagnosis.py`).
-QUANTILE = 0.75
 
 
 class Stray(NamedTuple):
-    """A channel, the channel whose fringes it sees too, and their amplitude relative to the right ones."""
+    """A channel, the channel whose fringes it sees too, and their amplitude relative to the right ones, at least."""
 
     to: str
     of: str
     share: float
+    least: float
 
 
 @dataclass(frozen=True)
@@ -49,7 +55,8 @@ class Fit:
 
     `contrast` is the amplitude over the mean light: 1 for full fringes, 0 without any. `crosstalk` (4, 4), or (3, 3)
     without infrared, is the amplitude of the fringes of each channel (columns) in each captured channel (rows),
-    relative to the fringes of the captured channel itself.
+    relative to the fringes of the captured channel itself. `harmonic_least` and `crosstalk_least` are the least sizes
+    of the ratios that the tiles of the image leave possible; -inf where there are too few.
     """
 
     names: tuple[str, ...]
@@ -57,128 +64,63 @@ class Fit:
     harmonic: NDArray[np.float64]
     crosstalk: NDArray[np.float64]
     contrast: NDArray[np.float64]
+    harmonic_least: NDArray[np.float64]
+    crosstalk_least: NDArray[np.float64]
 
     @property
     def worst_stray(self) -> Stray:
-        """The strongest crosstalk."""
-        stray = np.abs(self.crosstalk - np.diag(np.diag(self.crosstalk)))
-        to, of = np.unravel_index(int(np.argmax(stray)), stray.shape)
-        return Stray(self.names[int(to)], self.names[int(of)], float(stray[to, of]))
-
-
-@dataclass(frozen=True)
-class Drift:
-    """Offset of the infrared fringes from their expected position, projector px, over tiles of the image.
-
-    `off` is the share of tiles whose orders are all wrong by the same number of whole fringes.
-    """
-
-    median_px: float
-    worst_px: float
-    off: float
+        """The strongest crosstalk that is sure; without any, the one that may be the strongest."""
+        stray = np.abs(self.crosstalk) * ~np.eye(len(self.names), dtype=bool)
+        sure = np.where(stray > 0, self.crosstalk_least, -np.inf)
+        to, of = np.unravel_index(int(np.argmax(sure if sure.max() > 0 else stray)), stray.shape)
+        return Stray(self.names[int(to)], self.names[int(of)], float(stray[to, of]), float(sure[to, of]))
 
 
 def fit_fringes(shot: AnyShot, shape: Shape, plan: Plan) -> Fit | None:
     """Fit the waves of every channel in linear light; None when fewer than 5000 pixels carry fringes."""
-    light, backgrounds, inside = _waves(shot, shape, plan)
+    light, backgrounds, inside, period_px = relative_waves(shot, shape, plan)
     if inside.sum() < PIXELS_MIN:
         return None
-    phases = _phases(shape, plan, inside)
-    if plan.fringes.quadrature:  # blue is a quarter period before red
-        first, second, *third = phases
-        phases = (first, second, first, *third)
-    shown = np.stack([np.cos(phase) for phase in phases], axis=1)
-    if plan.fringes.quadrature:
-        shown[:, 2] = -np.sin(phases[2])
-    names, count = plan.fringes.channels, len(plan.fringes.channels)
-    amplitude, harmonic, crosstalk, contrast = np.zeros(count), np.zeros(count), np.zeros((count,) * 2), np.zeros(count)
-    for i, name in enumerate(names):
-        phase = phases[i]
-        twice = np.stack([np.cos(2 * phase), np.sin(2 * phase), np.ones_like(phase)], axis=1)
-        wave = light[name][inside] / backgrounds[name][inside] - 1
-        found = np.linalg.lstsq(np.hstack([shown, twice]), wave, rcond=None)[0]
-        crosstalk[i] = found[:count] / found[i]
-        harmonic[i] = float(np.hypot(found[count], found[count + 1]) / abs(found[i]))
-        contrast[i] = abs(found[i])
-        amplitude[i] = contrast[i] * float(np.median(backgrounds[name][inside]))
-    return Fit(names, amplitude, harmonic, crosstalk, contrast)
+    pixels, starts = tiles_of(inside, max(fit_params.TILE_OF_ERRORS_PX, period_px))
+    shown, phases = shown_waves(shape, plan, pixels)
+    found = []
+    for i, name in enumerate(plan.fringes.channels):
+        twice = np.stack([np.cos(2 * phases[i]), np.sin(2 * phases[i]), np.ones_like(phases[i])], axis=1)
+        background = backgrounds[name].ravel()[pixels]
+        wave = light[name].ravel()[pixels] / background - 1
+        equations = normal_equations(np.hstack([shown, twice]), wave.astype(np.float64), starts)
+        found.append(_channel(equations, i, float(np.median(background))))
+    return Fit(plan.fringes.channels, *(np.array(each) for each in zip(*found, strict=True)))
 
 
-def infrared_drift(shot: AnyShot, shape: Shape, plan: Plan) -> Drift | None:
-    """Compare infrared fringes with the position that the calibration predicts; None without, or with too few tiles.
+def _channel(
+    equations: Jackknife, own: int, light: float
+) -> tuple[float, float, NDArray[np.float64], float, float, Any]:
+    """Solve the equations of a channel: the figures of a `Fit`, in their order."""
+    count = equations.sides.shape[1] - 3
 
-    Without an infrared projector in the calibration, both projectors count as coaxial. A large misalignment shifts
-    every order by the same number of fringes, and the shape still looks plausible; the green fringes, which come from
-    the projector of red and blue, then give that number, because their tile mean is good to a hundredth of a fringe.
-    """
-    if not plan.fringes.infrared:
-        return None
-    light, backgrounds, inside = _waves(shot, shape, plan)
-    width = plan.projector_width_px
-    periods = [width / number for number in plan.fringes.numbers]
-    column = shape.column_px.astype(float)
-    places = (column, column, _expected_ir_column(shape, plan))
-    inside = inside & np.isfinite(places[2])
-    waves = [light[name] / np.maximum(backgrounds[name], 1e-6) - 1 for name in ("red", "green", "ir")]
-    away, shifts = [], []
-    for tile in _tiles(inside):
-        lit = inside[tile]
-        first, second, third = (
-            _offset_px(wave[tile][lit], place[tile][lit], period)
-            for wave, place, period in zip(waves, places, periods, strict=True)
-        )
-        shift = _fringes_off(_wrapped(second - first, periods[1]), periods)
-        away.append(_wrapped(third - first - shift * periods[0], periods[2]))
-        shifts.append(shift)
-    if len(away) < TILES_MIN:
-        return None
-    return Drift(float(np.median(away)), float(np.quantile(np.abs(away), QUANTILE)), _share_off(shifts))
+    def ratios(found: NDArray[np.float64]) -> NDArray[np.float64]:
+        harmonic = np.hypot(found[..., count], found[..., count + 1]) / found[..., own]
+        strays = found[..., :count] / found[..., own, None]
+        return np.asarray(np.abs(np.concatenate([harmonic[..., None], strays], axis=-1)))
+
+    # Without the waves of the others, which are nearly the same across a narrow object and share its contrast at will.
+    contrast = abs(float(equations.solved([own, count, count + 1, count + 2])[0]))
+    found = equations.solved()
+    (harmonic, *_), (harmonic_least, *least) = equations.least(ratios)
+    return contrast * light, harmonic, found[:count] / found[own], contrast, harmonic_least, least
 
 
-def _share_off(shifts: list[int]) -> float:
-    """Give the share of tiles that are off by the same number of fringes; crosstalk and prints push to either side."""
-    return max(shifts.count(shift) - shifts.count(-shift) for shift in range(-SHIFT_MAX, SHIFT_MAX + 1)) / len(shifts)
-
-
-def _tiles(inside: NDArray[np.bool_]) -> list[tuple[slice, slice]]:
-    rows, columns = inside.shape
-    tiles = [
-        (slice(y, y + TILE_PX), slice(x, x + TILE_PX))
-        for y in range(0, rows - TILE_PX + 1, TILE_PX)
-        for x in range(0, columns - TILE_PX + 1, TILE_PX)
-    ]
-    return [tile for tile in tiles if inside[tile].mean() >= TILE_SHARE]
-
-
-def _offset_px(wave: NDArray[np.floating], column: NDArray[np.float64], period: float) -> float:
-    """Return the offset of the fringes of a wave from their place, projector px, within half a period."""
-    phase = 2 * np.pi * column / period
-    design = np.stack([np.cos(phase), -np.sin(phase), np.ones_like(phase)], axis=1)
-    cos, sin, _ = np.linalg.lstsq(design, wave, rcond=None)[0]
-    return float(np.arctan2(sin, cos)) * period / (2 * np.pi)
-
-
-def _fringes_off(green_px: float, periods: list[float]) -> int:
-    """Return the smallest order error of red and blue, fringes, that explains the offset of green."""
-    shifts = sorted(range(-SHIFT_MAX, SHIFT_MAX + 1), key=abs)
-    missed = [abs(_wrapped(green_px - shift * periods[0], periods[1])) for shift in shifts]
-    close = min(missed) + 0.25 * abs(periods[0] - periods[1])
-    return next(shift for shift, miss in zip(shifts, missed, strict=True) if miss <= close)
-
-
-def _wrapped(offset_px: float, period: float) -> float:
-    return (offset_px + period / 2) % period - period / 2
-
-
-class _Waves(NamedTuple):
-    """Linear light and its mean over about a fringe, by channel, and the pixels where all of them are valid."""
+class Waves(NamedTuple):
+    """Linear light and its mean over about a fringe, by channel, the pixels where all are valid, and the period."""
 
     light: dict[str, Map]
     backgrounds: dict[str, Map]
     inside: NDArray[np.bool_]
+    period_px: float
 
 
-def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> _Waves:
+def relative_waves(shot: AnyShot, shape: Shape, plan: Plan) -> Waves:
     """Compute the linear light of a shot and its mean over about a fringe."""
     import cv2
 
@@ -192,14 +134,21 @@ def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> _Waves:
         summed = cv2.GaussianBlur(np.where(known, image, 0).astype(np.float32), (0, 0), period_px)
         backgrounds[name] = summed / np.maximum(weight, 1e-6)
     inside = known & (weight > 0.95) & np.all([b > 0.02 for b in backgrounds.values()], axis=0)
-    return _Waves(light, backgrounds, inside)
+    return Waves(light, backgrounds, inside, period_px)
 
 
-def _phases(shape: Shape, plan: Plan, inside: NDArray[np.bool_]) -> tuple[NDArray[np.float64], ...]:
+def shown_waves(shape: Shape, plan: Plan, pixels: NDArray[np.intp]) -> tuple[Wave, list[Wave]]:
+    """Give the fringes that each channel shows at some pixels, (N, channels), and their phases."""
     column = shape.column_px.astype(float)
     third = infrared_column(shape, plan) if plan.fringes.infrared else column
     numbers = zip(plan.fringes.numbers, (column, column, third), strict=False)  # there may be two
-    return tuple(2 * np.pi * number * seen[inside] / plan.projector_width_px for number, seen in numbers)
+    phases = [2 * np.pi * number * seen.ravel()[pixels] / plan.projector_width_px for number, seen in numbers]
+    if plan.fringes.quadrature:
+        phases.insert(2, phases[0])
+    shown = np.stack([np.cos(phase) for phase in phases], axis=1)
+    if plan.fringes.quadrature:  # blue is a quarter period before red
+        shown[:, 2] = -np.sin(phases[2])
+    return shown, phases
 
 
 def infrared_column(shape: Shape, plan: Plan) -> NDArray[np.float64]:
@@ -208,11 +157,11 @@ def infrared_column(shape: Shape, plan: Plan) -> NDArray[np.float64]:
     It is that of the visible projector, unless the shape was decoded with the calibration of both projectors.
     """
     if plan.decode.unwrapping == "pair" and plan.fringes.predeformed_z_mm is None:
-        return _expected_ir_column(shape, plan)
+        return expected_column(shape, plan)
     return shape.column_px.astype(float)
 
 
-def _expected_ir_column(shape: Shape, plan: Plan) -> NDArray[np.float64]:
+def expected_column(shape: Shape, plan: Plan) -> NDArray[np.float64]:
     """Return the column of the infrared projector that lights each point according to the calibration."""
     calibration = plan.calibration
     if calibration is None or calibration.infrared is None or shape.xyz_mm is None:

@@ -208,6 +208,11 @@ BLURRED_CONTRAST = 0.78
 # Largest detail finer than the fringes, over the noise. Sound scenes with edges have 2.3 or more, blurred ones at
 # most 1.96. A larger number calls sharp scenes in room light blurred.
 SHARP_MIN = 2.15
+# Steepness of the strongest detail. Sharp print and edges have 0.57 or more, blurred by 3 px 0.34 to 0.58, by 4 px up
+# to 0.55; highlights, which have no edge, have 0.44 to 0.93 (`pytest tests/test_first_cause.py -s`, scenes of
+# `evaluation/world.py` with seeds 13 and 14). A larger number calls sharp scenes in room light blurred, a smaller one
+# misses blur.
+STEEP_MIN = 0.55
 # Standard deviation of the blur, px, that the contrasts of 36 and 30 fringes must show together. Scatter of the
 # contrasts reaches 1.7 px. A larger number misses light blur.
 BLUR_PX = 2.2
@@ -251,12 +256,6 @@ SATURATED = 0.1
 # Rows between those whose saturated pixels are counted. A larger number misses small images, a smaller one costs time
 # in every decode: 0.20 ms with 1, 0.08 ms with 4 (`python benches/checks.py`).
 SATURATED_ROWS = 4
-# Ratio of the second harmonic to the first, from which a refused shot is said to be not linear. Sound shots have
-# 0.007.
-HARMONIC = 0.08
-# Relative amplitude of the fringes of another channel from which a refused shot is said to have crosstalk.
-STRAY = 0.15
-
 # --- Black of a stated response: `python evaluation/captures.py` holds captures with a tenth of the light against the
 # --- response of their full light. They have a channel below black in 0.5 or more of the places, the others in 0.001.
 

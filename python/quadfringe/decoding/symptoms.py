@@ -19,6 +19,7 @@ from quadfringe.decoding.stages import carrier, linear_light, wrapped_phases
 from quadfringe.errors import DecodeError
 
 __all__ = [
+    "Angle",
     "Bits",
     "Closure",
     "bits_in_use",
@@ -27,14 +28,11 @@ __all__ = [
     "closing_steps",
     "closure_of",
     "closure_of_waves",
-    "coarse_contrast",
-    "fine_over_coarse",
     "linear_light_of",
     "local_mean",
     "local_rates",
     "rows_match",
     "saturation",
-    "sharpness",
     "waves_of",
 ]
 
@@ -80,6 +78,11 @@ class Closure:
     infrared_px: float
 
     @property
+    def off(self) -> float:
+        """The larger deviation of a frequency from what the fringe numbers say."""
+        return max(abs(self.green - 1), abs(self.infrared - 1))
+
+    @property
     def shift_px(self) -> float:
         """The shift of the infrared image along x, px, that explains the angle, up to whole periods."""
         return -self.angle.rad / (2 * np.pi) * self.infrared_px
@@ -111,8 +114,16 @@ def bits_in_use(shot: AnyShot) -> Bits | None:
 
 
 def brightness(shot: AnyShot) -> dict[str, float]:
-    """Give the brightest hundredth of each channel, share of full scale."""
-    return {n: float(np.quantile(i[::4, ::4], 0.99)) / shot.full_scale_value for n, i in shot.channels.items()}
+    """Give the brightest hundredth of what is lit of each channel, share of full scale.
+
+    Of a dark frame, a hundredth may be half of the object. Means of neighbours leave out noise and single hot pixels.
+    """
+    import cv2
+
+    samples = {name: image[::4, ::4] for name, image in shot.channels.items()}
+    mean = cv2.blur(np.mean(list(samples.values()), axis=0), (3, 3))
+    lit = mean > params.LIT_SHARE * np.quantile(mean, 0.999)
+    return {name: float(np.quantile(image[lit], 0.99)) / shot.full_scale_value for name, image in samples.items()}
 
 
 def saturation(shot: AnyShot) -> dict[str, float]:
@@ -120,49 +131,6 @@ def saturation(shot: AnyShot) -> dict[str, float]:
     level = saturated_from(shot)
     rows = {name: image[:: params.SATURATED_ROWS] for name, image in shot.channels.items()}
     return {name: np.count_nonzero(image >= level) / image.size for name, image in rows.items()}
-
-
-def sharpness(shot: AnyShot) -> float:
-    """Give the strongest detail of a few px over the noise of the same scale; about 1.4 when there is only noise."""
-    import cv2
-
-    found = []
-    for image in shot.channels.values():
-        light = image.astype(np.float32)
-        detail = cv2.GaussianBlur(light, (0, 0), 1.5) - cv2.GaussianBlur(light, (0, 0), 3.0)
-        noise = 1.4826 * float(np.median(np.abs(detail - np.median(detail))))
-        found.append(float(np.quantile(np.abs(detail), 0.995)) / max(noise, 1e-9))
-    return float(np.median(found))
-
-
-def coarse_contrast(shot: AnyShot, plan: Plan) -> float:
-    """Give the contrast of whatever is wider than a pixel, median of the channels: at least that of the fringes.
-
-    The product of neighbours leaves out noise.
-    """
-    import cv2
-
-    found = []
-    for light in linear_light_of(shot, plan).values():
-        light = np.nan_to_num(light)
-        mean = cv2.GaussianBlur(light, (0, 0), params.MEAN_PX)
-        lit = mean > params.LIT_SHARE * float(np.quantile(mean[::4, ::4], 0.99))
-        wave = np.where(lit, light / np.maximum(mean, 1e-6) - 1, 0)
-        both = lit[:, 1:] & lit[:, :-1]
-        found.append(float(np.sqrt(max(2 * np.mean((wave[:, 1:] * wave[:, :-1])[both]), 0.0))) if both.any() else 0.0)
-    return float(np.median(found))
-
-
-def fine_over_coarse(shot: AnyShot) -> float:
-    """Give the strongest detail of a few px over that of four times the size: 1 for sharp edges, less with blur."""
-    import cv2
-
-    found = []
-    for image in shot.channels.values():
-        smooth = [cv2.GaussianBlur(image.astype(np.float32), (0, 0), sigma) for sigma in (1.5, 3.0, 6.0, 12.0)]
-        fine, coarse = (np.quantile(np.abs(smooth[i] - smooth[i + 1]), 0.995) for i in (0, 2))
-        found.append(float(fine) / max(float(coarse), 1e-9))
-    return float(np.median(found))
 
 
 def closure_of(shot: AnyShot, plan: Plan, lit: NDArray[np.bool_] | None = None) -> Closure | None:

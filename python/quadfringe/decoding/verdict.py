@@ -11,6 +11,7 @@ from quadfringe.decoding import params
 from quadfringe.decoding import verdict_params as limits
 from quadfringe.decoding._kernel import KernelDecoder
 from quadfringe.decoding.agreement import Agreement
+from quadfringe.decoding.blur import vanishing
 from quadfringe.decoding.cause import ORDERS, Cause
 from quadfringe.decoding.causes import (
     NUMBERS_FIX,
@@ -22,7 +23,6 @@ from quadfringe.decoding.causes import (
     other_numbers,
     period_fix,
     strange,
-    vanishing,
     wrong_bits,
 )
 from quadfringe.decoding.channel_offsets import drifting

@@ -9,11 +9,13 @@ import numpy as np
 
 from quadfringe.config import Response
 from quadfringe.data import AnyShot, Shape
-from quadfringe.decoding import Decoder, Plan
-from quadfringe.decoding.causes import blur, registration, wrong_bits
-from quadfringe.decoding.channel_offsets import contradiction
-from quadfringe.decoding.fringe_fit import Fit, fit_fringes, infrared_drift
+from quadfringe.decoding import Decoder, Plan, fit_params
+from quadfringe.decoding.blur import blur
+from quadfringe.decoding.causes import registration, wrong_bits
+from quadfringe.decoding.channel_offsets import contradiction, decoded_closure
+from quadfringe.decoding.fringe_fit import Fit, fit_fringes
 from quadfringe.decoding.light_border import BY_HAND, borders_of
+from quadfringe.decoding.pair_drift import infrared_drift
 from quadfringe.decoding.plan import stated_response
 from quadfringe.decoding.plausibility import geometry_of, implausible
 from quadfringe.decoding.symptoms import brightness, closure_of, saturation
@@ -81,7 +83,8 @@ def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> list[Finding]:
     """Check the fringes of a decoded shot, channel by channel and against one another."""
     closure = closure_of(shot, plan)
     fit = fit_fringes(shot, shape, plan)
-    named = [contradiction(shape, shot, plan) or registration(shot, plan, closure), blur(shot, fit, plan, closure)]
+    moved = contradiction(shape, shot, plan) or registration(shot, plan, decoded_closure(closure, shape, shot, plan))
+    named = [moved, blur(shot, fit, plan, closure)]
     if fit is None:
         words = "too few pixels carry fringes to check response and crosstalk"
         few = Finding("fringes", "warning", words, "fill more of the field with the object")
@@ -91,7 +94,7 @@ def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> list[Finding]:
         *_amplitudes(fit, brightness(shot)),
         _linearity(fit, plan),
         _crosstalk(fit, plan),
-        *([_drift(shot, shape, plan)] if plan.fringes.infrared else []),
+        *([_drift(shot, shape, plan, fit)] if plan.fringes.infrared else []),
     ]
 
 
@@ -173,25 +176,34 @@ def _amplitudes(fit: Fit, tops: Mapping[str, float]) -> list[Finding]:
 
 
 def _linearity(fit: Fit, plan: Plan) -> Finding:
-    worst = int(np.argmax(fit.harmonic))
-    value = float(fit.harmonic[worst])
+    sure = fit.harmonic_least > fit_params.SOUND
+    worst = int(np.argmax(np.where(sure, fit.harmonic, 0) if sure.any() else fit.harmonic))
+    value, least = float(fit.harmonic[worst]), float(fit.harmonic_least[worst])
     words = f"the second harmonic of {fit.names[worst]} is {value:.1%} of the first"
     known = isinstance(stated_response(plan.response, plan.calibration), Response)
     again = "estimate it again" if known else "estimate it"
     fix = f"switch off the gamma table of the projector, or {again}: quadfringe calibrate response"
-    return graded("response", value, NOT_LINEAR, words, fix)
+    return _if_sure(graded("response", value, NOT_LINEAR, words, fix), least)
 
 
 def _crosstalk(fit: Fit, plan: Plan) -> Finding:
-    to, of, value = fit.worst_stray
+    to, of, value, least = fit.worst_stray
     words = f"{to} sees {value:.1%} of the fringes of {of}"
     known = plan.calibration is not None and plan.calibration.crosstalk is not None
     fix = "add band-pass filters, or " + ("calibrate it again" if known else "calibrate it") + ": quadfringe calibrate"
-    return graded("crosstalk", value, CROSSTALK, words, fix)
+    return _if_sure(graded("crosstalk", value, CROSSTALK, words, fix), least)
 
 
-def _drift(shot: AnyShot, shape: Shape, plan: Plan) -> Finding:
-    drift = infrared_drift(shot, shape, plan)
+def _if_sure(one: Finding, least: float) -> Finding:
+    """Give a finding if the least that its value may be is more than sound shots have; else a note."""
+    if one.grade == "good" or least > fit_params.SOUND:
+        return one
+    words = "cannot be measured: the object is too narrow, or its print too strong"
+    return Finding(one.name, "note", words, "fill more of the field with an object of one colour", one.value)
+
+
+def _drift(shot: AnyShot, shape: Shape, plan: Plan, fit: Fit) -> Finding:
+    drift = infrared_drift(shot, shape, plan, fit)
     if drift is None:
         words = "too few pixels carry fringes to check the coaxial pair"
         return Finding("coaxial pair", "warning", words, "fill more of the field with the object")

@@ -15,8 +15,23 @@ from quadfringe import _core
 from quadfringe.config import Device
 from quadfringe.data import Calibration, Shot, core_device
 from quadfringe.evaluation import world
+from quadfringe.evaluation._isolated import outline
 
-__all__ = ["CAUSES", "GOOD", "Case", "Change", "broken", "calibrated", "exchanged", "shifted", "sound"]
+__all__ = [
+    "CAUSES",
+    "GOOD",
+    "Case",
+    "Change",
+    "Fault",
+    "broken",
+    "calibrated",
+    "cut_out",
+    "exchanged",
+    "exposed",
+    "shifted",
+    "sound",
+    "stray",
+]
 
 NOISE = 0.02  # standard deviation, share of full scale
 # Sound scenes and their seeds. Reliefs take long to cast, so that they have fewer seeds and a camera of half the size.
@@ -92,7 +107,7 @@ def _all(function: Callable[[NDArray[Any]], NDArray[Any]]) -> Change:
     return lambda images: {name: np.ascontiguousarray(function(image)) for name, image in images.items()}
 
 
-def _stray(pairs: dict[tuple[int, int], float]) -> dict[str, Any]:
+def stray(pairs: dict[tuple[int, int], float]) -> dict[str, Any]:
     """Give a crosstalk matrix with these entries, (captured, projected), and a gain that clips no crest."""
     matrix = np.eye(4)
     for place, share in pairs.items():
@@ -113,9 +128,9 @@ CAUSES: dict[str, tuple[Fault, Fault, Fault]] = {
     ),
     "response": tuple(Fault(f"{g:g}", {"projector_exponent": (g,) * 4}) for g in (1.4, 1.8, 2.4)),  # type: ignore[dict-item]
     "crosstalk": (
-        Fault("0.1 green in red", _stray({(0, 1): 0.1})),
-        Fault("0.2 ir in green", _stray({(1, 3): 0.2})),
-        Fault("0.3 all visible", _stray({(0, 1): 0.3, (1, 0): 0.3, (1, 2): 0.3, (2, 1): 0.3})),
+        Fault("0.1 green in red", stray({(0, 1): 0.1})),
+        Fault("0.2 ir in green", stray({(1, 3): 0.2})),
+        Fault("0.3 all visible", stray({(0, 1): 0.3, (1, 0): 0.3, (1, 2): 0.3, (2, 1): 0.3})),
     ),
     "infrared registration": (
         Fault("3, 0 px", change=shifted(3, 0)),
@@ -144,14 +159,14 @@ def broken(causes: tuple[str, ...] = tuple(CAUSES), seed: int = 2) -> Iterator[C
         number = list(CAUSES).index(cause)
         for strength, fault in enumerate(CAUSES[cause]):
             scene = SCENES[(strength + number) % len(SCENES)]
-            yield Case(cause, fault.strength, scene, _exposed(scene, seed, fault))
+            yield Case(cause, fault.strength, scene, exposed(scene, seed, fault))
 
 
 def sound(scenes: Mapping[str, tuple[int, ...]] = MappingProxyType(GOOD)) -> Iterator[Case]:
     """Give shots without a fault: scenes with their seeds."""
     for scene, seeds in scenes.items():
         for seed in seeds:
-            yield Case("", f"seed {seed}", scene, _exposed(scene, seed, Fault("")))
+            yield Case("", f"seed {seed}", scene, exposed(scene, seed, Fault("")))
 
 
 def calibrated(case: Case, calibration: Calibration) -> Calibration:
@@ -160,8 +175,19 @@ def calibrated(case: Case, calibration: Calibration) -> Calibration:
     return calibration.model_copy(update={"camera": HALF}) if half else calibration
 
 
-def _exposed(scene: str, seed: int, fault: Fault) -> Shot:
-    bench = _core.Bench(camera=core_device(HALF)) if scene in RELIEFS else _core.Bench()
+def cut_out(shot: Shot, fill: float, seed: int) -> Shot:
+    """Leave an object that fills a share of the frame, on black with the noise of its sensor."""
+    inside, noise = outline(shot.first.shape, fill, seed), np.random.default_rng(seed)
+    black = np.clip(np.round(noise.normal(1, 2, (4, *inside.shape))), 0, 255)
+    images = zip(shot.channels.values(), black, strict=True)
+    red, green, blue, ir = (np.where(inside, image, dark).astype(np.uint8) for image, dark in images)
+    return Shot(red, green, blue, ir)
+
+
+def exposed(scene: str, seed: int, fault: Fault, *, half: bool | None = None) -> Shot:
+    """Expose a scene with a fault, reliefs at half the size unless it is stated."""
+    small = scene in RELIEFS if half is None else half
+    bench = _core.Bench(camera=core_device(HALF)) if small else _core.Bench()
     drawn = world.SCENES[scene](bench, np.random.default_rng([seed, 77]))
     options = (drawn.options or {}) | (fault.options or {})
     drawn = replace(drawn, options=options, fringe_numbers=fault.numbers or drawn.fringe_numbers)
