@@ -10,13 +10,15 @@ import numpy as np
 from quadfringe.config import Response
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import Decoder, Plan
-from quadfringe.decoding.causes import blur, registration, wrong_bits
+from quadfringe.decoding.causes import blur, wrong_bits
 from quadfringe.decoding.channel_offsets import contradiction
+from quadfringe.decoding.closures import closure_of
 from quadfringe.decoding.fringe_fit import Fit, fit_fringes, infrared_drift
 from quadfringe.decoding.light_border import BY_HAND, borders_of
 from quadfringe.decoding.plan import stated_response
 from quadfringe.decoding.plausibility import geometry_of, implausible
-from quadfringe.decoding.symptoms import brightness, closure_of, saturation
+from quadfringe.decoding.registration import registration
+from quadfringe.decoding.symptoms import brightness, saturation
 from quadfringe.doctor.finding import Finding, graded, told
 from quadfringe.errors import DecodeError, DecodeWarning
 
@@ -79,7 +81,7 @@ def _rank(one: Finding) -> tuple[int, int]:
 
 def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> list[Finding]:
     """Check the fringes of a decoded shot, channel by channel and against one another."""
-    closure = closure_of(shot, plan)
+    closure = closure_of(shot, plan, np.isfinite(shape.quality))
     fit = fit_fringes(shot, shape, plan)
     named = [contradiction(shape, shot, plan) or registration(shot, plan, closure), blur(shot, fit, plan, closure)]
     if fit is None:
