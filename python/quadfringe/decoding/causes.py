@@ -33,6 +33,7 @@ __all__ = [
 # 0.1 of the frame spans four fringes of a twelfth of its width. Not measured: it only adds a line to the fix.
 FEW_LIT = 0.1
 TURN_FIX = "turn the images, or the camera, by 90 degrees, or decode with the joint method (--method joint)"
+USUAL_BITS = 8, 12, 14  # of cameras; 10 bits are rare, and a dim shot of 12 bits looks like them
 FOCUS = "focus the camera and the projectors on the object, close the aperture, and hold the object still"
 
 
@@ -87,10 +88,13 @@ def wrong_bits(shot: AnyShot) -> Cause | None:
     bits = symptoms.bits_in_use(shot)
     if bits is None:
         return None
-    words = f"no pixel of the 16-bit images is above {bits.top}: they hold {bits.held} bits and were read as 16"
+    least = "" if bits.exact else "at least "
+    usual = bits.held if bits.exact else next(depth for depth in USUAL_BITS if depth >= bits.held)
+    words = f"no pixel of the 16-bit images is above {bits.top}: they hold {least}{bits.held} bits and were read as 16"
     words += "" if bits.sure else ", or have at most a quarter of the light"
-    fix = f"read them with bits={bits.held}, on the command line --bits {bits.held}"
-    fix += "" if bits.sure else "; if the camera delivers 16 bits, lengthen the exposure or open the aperture"
+    fix = f"read them with bits={usual}, on the command line --bits {usual}"
+    fix += "" if bits.exact else ", or as many as the camera delivers: a brighter shot may need more than this one"
+    fix += "" if bits.sure else "; if it delivers 16 bits, lengthen the exposure or open the aperture"
     return Cause("bits", words, fix, fatal=bits.sure)
 
 

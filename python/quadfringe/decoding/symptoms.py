@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,11 +31,15 @@ DEPTHS = (8, 10, 12, 14)  # bits that cameras deliver in 16-bit files
 
 @dataclass(frozen=True)
 class Bits:
-    """The bits that 16-bit data hold, whether less light would not explain it as well, and the largest value."""
+    """The bits that 16-bit data hold, whether less light would not explain it as well, and the largest value.
+
+    `exact` if crests are cut off there; else a brighter shot of the same camera may need more bits.
+    """
 
     held: int
     sure: bool
     top: int
+    exact: bool = field(default=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -58,7 +62,7 @@ def bits_in_use(shot: AnyShot) -> Bits | None:
     top = max(int(image.max()) for image in shot.images.values())
     width = top.bit_length()
     if 8 <= width < 16 and top == 2**width - 1 and sum(np.count_nonzero(i == top) for i in shot.images.values()) > 1:
-        return Bits(width, True, top)
+        return Bits(width, True, top, exact=True)
     held = next((bits for bits in DEPTHS if 0 < top < 2**bits), None)
     return None if held is None else Bits(held, held <= params.SURE_BITS, top)
 
