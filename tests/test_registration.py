@@ -1,4 +1,4 @@
-"""The shift of infrared is told by whole fringes, with its sign, and on objects of few fringes."""
+"""Messages state the shift of infrared by whole fringes, with its sign, and on objects of few fringes."""
 
 from __future__ import annotations
 

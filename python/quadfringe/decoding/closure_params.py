@@ -12,7 +12,7 @@ __all__: list[str] = []
 
 # Side of a square, px. The local frequencies are means over 25 px, so that smaller squares know of one another and the
 # error comes out too small; larger ones leave small objects without an error.
-SQUARE_PX = 50
+RATIO_SQUARE_PX = 50
 # Share of a square that must be known, and the fewest squares that give an error. A larger share or number leaves small
 # objects without an error, which then are named by other tests only; a smaller one sees little but rims.
 SQUARE_SHARE, SQUARES_MIN = 0.25, 4
@@ -38,7 +38,7 @@ ERRORS_MAX = 3.0
 
 # Turns of drift of the infrared offsets over the field that are looked for once the closure drifts. 49, 48, 42 read as
 # 36, 35, 30 have 7, and 64, 63, 56 have 16 of opposite sense. A larger number finds chance, which the ratios then
-# contradict; a smaller one misses such numbers, whose ratios alone are told.
+# contradict; a smaller one misses such numbers, for which only the ratios are stated.
 CLOSED_TURNS_MAX = 8
 
 # Probability with which chance may show a drift that both ratios then confirm. Narrow objects in half an image have
@@ -50,7 +50,7 @@ DRIFT_BY_CHANCE = 1e-3
 
 # Largest shift along x that is looked for, share of the image width. A larger one finds chance: on a slanted plane a
 # shift of 0.1 has nearly the phases of 36, 35, 31 fringes.
-REACH = 0.1
+SHIFT_REACH = 0.1
 # Errors by which the closure must be longer with infrared moved by this shift than by the nearest one, or not at all.
 # 21 and 40 px on a face, 1 and 2 periods on clutter and steps have 5 to 30 (`pytest tests/test_registration.py -s`). A
 # smaller number finds whole fringes by chance, a larger one names shifts of half a fringe with the wrong sign.

@@ -125,7 +125,7 @@ def closure_of_waves(waves: list[Complex], plan: Plan) -> Closure | None:
 
 def _error_of_median(ratio: Map) -> float:
     """Give the standard error of the median of a map: from the medians of squares that know little of one another."""
-    squares = in_squares(ratio, limits.SQUARE_PX)
+    squares = in_squares(ratio, limits.RATIO_SQUARE_PX)
     known = np.count_nonzero(np.isfinite(squares), axis=1)
     full = known >= limits.SQUARE_SHARE * squares.shape[1]
     if np.count_nonzero(full) < limits.SQUARES_MIN:

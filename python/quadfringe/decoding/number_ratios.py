@@ -1,7 +1,7 @@
 """Fringe numbers of a shot by the two ratios that it shows: green to red, and infrared to red, with their errors.
 
 Ratios over few fringes have large errors. So numbers are doubted, and others proposed, by how likely they make what was
-measured; where none are likely the ratios are told as they are.
+measured; where none are likely the message states the ratios.
 """
 
 from __future__ import annotations

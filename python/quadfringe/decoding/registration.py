@@ -106,7 +106,7 @@ def _whole_fringes_px(plan: Plan, closure: Closure, *, fits: bool) -> float | No
     base = closed_wave([*closure.waves[:2], np.ones_like(closure.waves[2])], plan.fringes.numbers)
     if base is None or not np.isfinite(closure.shift_px):
         return None
-    reach_px = limits.REACH * base.shape[1]
+    reach_px = limits.SHIFT_REACH * base.shape[1]
     turns = range(-int(reach_px / closure.infrared_px) - 1, int(reach_px / closure.infrared_px) + 2)
     starts = [closure.shift_px + turn * closure.infrared_px for turn in turns]
     moves = [_refined(closure, base, start) for start in starts if start == closure.shift_px or abs(start) <= reach_px]
@@ -140,7 +140,7 @@ def _refined(closure: Closure, base: Complex, shift_px: float) -> _Move:
 
 def _undone(closure: Closure, base: Complex, shift_px: float) -> _Move:
     closed = base * _moved(closure.waves[2], -round(shift_px))
-    return _Move(shift_px, in_squares(closed, limits.SQUARE_PX))
+    return _Move(shift_px, in_squares(closed, limits.RATIO_SQUARE_PX))
 
 
 def _moved(wave: Complex, columns: int) -> Complex:

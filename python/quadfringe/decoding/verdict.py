@@ -271,6 +271,6 @@ def _band(shape: Shape, shot: AnyShot, decoder: KernelDecoder) -> tuple[KernelDe
 
 
 def _lit_band(shape: Shape) -> NDArray[np.bool_]:
-    """Say which pixels of that band are lit: dark ground around an object has frequencies of its own, by chance."""
+    """Say which pixels of that band are lit: dark ground around an object has any frequencies, by chance."""
     first, count = band_of(shape)
     return np.isfinite(shape.quality[first : first + count])
