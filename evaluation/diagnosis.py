@@ -13,7 +13,8 @@ from itertools import chain
 from pathlib import Path
 
 import quadfringe as qf
-from quadfringe.decoding import detail, symptoms
+from quadfringe.decoding import detail
+from quadfringe.decoding.closures import closure_of
 from quadfringe.doctor import Finding, examine_shot
 from quadfringe.evaluation import broken
 from quadfringe.files import figures_text
@@ -52,7 +53,7 @@ def main() -> None:
         alarms += not case.cause and not good
         print(f"{'ok   ' if good else 'WRONG'} {case.cause or 'sound'}, {case.strength}, {case.scene}: {words[:160]}")
         if options.figures:
-            print(f"      {symptoms.closure_of(case.shot, plan)}, sharpness {detail.sharpness(case.shot):.2f}")
+            print(f"      {closure_of(case.shot, plan)}, sharpness {detail.sharpness(case.shot):.2f}")
     print(f"{right} of {3 * len(causes)} causes are named first, {alarms} false alarms on sound shots")
     if options.json:
         options.json.write_text(figures_text({"causes_named_first": right, "false_alarms": alarms}))

@@ -18,6 +18,7 @@ from quadfringe.cli import app
 from quadfringe.data import Calibration, CalibrationRecord, CalibrationStep
 from quadfringe.data.shot_files import write_shot
 from quadfringe.decoding import symptoms
+from quadfringe.decoding.closures import closure_of
 from quadfringe.decoding.plausibility import geometry_of
 from quadfringe.doctor import examine_shot
 from quadfringe.evaluation import broken
@@ -66,7 +67,7 @@ def test_a_sound_painted_face_has_no_finding() -> None:
 def test_the_shift_that_mends_infrared_is_told(columns: int, rows: int, bench: tuple[qf.Shot, Calibration]) -> None:
     shot, _ = bench
     ir = np.roll(shot.ir, (rows, columns), axis=(0, 1))
-    closure = symptoms.closure_of(qf.Shot(shot.red, shot.green, shot.blue, ir), qf.Plan(912))
+    closure = closure_of(qf.Shot(shot.red, shot.green, shot.blue, ir), qf.Plan(912))
     assert closure is not None
     match = symptoms.rows_match(qf.Shot(shot.red, shot.green, shot.blue, ir), qf.Plan(912), closure.shift_px)
     assert match is not None

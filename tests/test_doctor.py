@@ -157,6 +157,14 @@ def test_the_command_line_says_it(tmp_path: Path) -> None:
     assert (missing.exit_code, "no image of a shot in it; expected red.png" in missing.stderr) == (2, True)
 
 
+def test_the_period_that_a_refusal_asks_for_is_taken(tmp_path: Path) -> None:
+    write_shot(tmp_path, shot_of()[0])
+    run = CliRunner().invoke(app, ["doctor", str(tmp_path), "--period-px", "15", "30"])
+    assert run.exit_code == 0, run.output
+    wrong = CliRunner().invoke(app, ["doctor", str(tmp_path), "--period-px", "30", "15"])
+    assert (wrong.exit_code, "--period-px" in wrong.stderr) == (2, True)
+
+
 def test_the_fault_of_a_shot_comes_before_the_warnings_of_its_calibration(tmp_path: Path) -> None:
     shot, calibration = shot_of()
     write_shot(tmp_path, qf.Shot(shot.blue, shot.green, shot.red, shot.ir, shot.full_scale))

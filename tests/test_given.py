@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 import quadfringe as qf
 from quadfringe.data import Calibration
 from quadfringe.decoding import params
+from quadfringe.decoding.causes import wrong_bits
 from quadfringe.decoding.given import same_images
 from quadfringe.decoding.readings import other_readings
 from quadfringe.decoding.symptoms import Bits, bits_in_use
@@ -158,6 +159,19 @@ def test_bits_of_a_camera_are_told_without_such_crests(
     if found is not None:
         assert found.sure == (told <= params.SURE_BITS)
         assert first(shot, bench[1])[0] == "bits"
+
+
+def test_a_dim_shot_says_at_least_how_many_bits_it_holds(bench: tuple[qf.Shot, Calibration]) -> None:
+    """A quarter of the light of a 12-bit camera leaves values of 10 bits, which its next shot exceeds."""
+    images = [image.astype(np.uint16) * 4 for image in bench[0].channels.values()]
+    named = wrong_bits(qf.Shot(*images))
+    assert named is not None
+    assert "at least 10 bits" in named.found
+    assert "--bits 12, or as many as the camera delivers" in named.fix
+    crests = wrong_bits(qf.Shot(*(np.minimum(5 * image, 1023) for image in images)))
+    assert crests is not None
+    assert "they hold 10 bits" in crests.found
+    assert crests.fix.endswith("--bits 10")
 
 
 # Infrared

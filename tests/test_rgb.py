@@ -16,8 +16,8 @@ from quadfringe.calibration.levels import dark_level, mean_levels
 from quadfringe.calibration.session.virtual import VirtualCaptures
 from quadfringe.config import Camera, ChannelResponse
 from quadfringe.data import Calibration, read_shot, write_shot
+from quadfringe.decoding.closures import closure_of
 from quadfringe.decoding.stages import columns_from_phase, demodulate, discard_invalid, linear_light, order
-from quadfringe.decoding.symptoms import closure_of
 from quadfringe.evaluation import three_colours, world
 
 RGB = qf.Fringes(encoding="rgb", numbers=(16, 15))

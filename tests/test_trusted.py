@@ -17,7 +17,7 @@ from quadfringe.config import Device
 from quadfringe.data import Reason
 from quadfringe.decoding import verdict_params
 from quadfringe.decoding._kernel import KernelDecoder
-from quadfringe.decoding.symptoms import closure_of
+from quadfringe.decoding.closures import closure_of
 from quadfringe.decoding.trusted import is_scattered, trusted_part
 from quadfringe.errors import DecodeError
 from quadfringe.evaluation import _scenes as scenes

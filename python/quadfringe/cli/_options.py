@@ -45,6 +45,7 @@ __all__ = [
     "in_words",
     "joined_numbers",
     "method_named",
+    "one_or_two",
 ]
 
 
@@ -269,6 +270,11 @@ def in_words(error: typer.BadParameter) -> str:
     problem = problems(include_url=False)[0]
     chosen = re.fullmatch(r"(?:Value error, )?('.*') is not one of (.*?)\.?", problem["msg"])
     return f"expected one of {chosen[2]}, got {chosen[1]}" if chosen else reason(problem)
+
+
+def one_or_two(values: tuple[float, ...] | None) -> float | tuple[float, ...] | None:
+    """Give the only one of several values as a number, as settings have it."""
+    return values[0] if values and len(values) == 1 else values
 
 
 def decode_settings(options: Mapping[str, Any]) -> DecodeConfig:

@@ -28,6 +28,7 @@ from quadfringe.cli._options import (
     decode_settings,
     fringes_from,
     method_named,
+    one_or_two,
 )
 from quadfringe.cli._output import caution, note, say, write_figures
 from quadfringe.cli._results import response_told, uncertainty_told
@@ -182,7 +183,7 @@ def _settings(
     """Give the options of the method by the names of the settings."""
     given: dict[str, Any] = {"method": method, "unwrapping": unwrapping and unwrapping.value}
     given |= {"depth_range_mm": depth_range_mm, "channel_instants_us": channel_instants_us}
-    given["period_px"] = period_px[0] if period_px and len(period_px) == 1 else period_px
+    given["period_px"] = one_or_two(period_px)
     return given
 
 

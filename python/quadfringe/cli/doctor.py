@@ -19,7 +19,10 @@ from quadfringe.cli._options import (
     EncodingOption,
     FringesOption,
     JsonOption,
+    PeriodOption,
+    decode_settings,
     fringes_from,
+    one_or_two,
 )
 from quadfringe.cli._output import say, write_record
 from quadfringe.cli._screens import say_picture_modes
@@ -72,6 +75,7 @@ def doctor(
     projector_width: ColumnsOption = 912,
     bayer: BayerOption = None,
     bits: BitsOption = None,
+    period_px: PeriodOption = None,
     board: BoardOption = False,
     target: TargetOption = None,
     plane: PlaneOption = False,
@@ -95,7 +99,8 @@ def doctor(
     given = _sorted_paths(files or [], several=surface is not None)
     calibration = None if given.calibration is None else Calibration.load(given.calibration)
     found: list[Finding] = [] if files else examine_installation()
-    plan = Plan(projector_width, fringes_from(encoding, fringes, columns), calibration)
+    settings = decode_settings({"period_px": one_or_two(period_px)})
+    plan = Plan(projector_width, fringes_from(encoding, fringes, columns), calibration, decode=settings)
     for folder in given.shots:
         one = _examined(_shot_in(folder, bayer, bits), plan, surface)
         found += [replace(each, name=f"{folder.name} {each.name}") for each in one] if len(given.shots) > 1 else one

@@ -7,9 +7,9 @@ import numpy as np
 from quadfringe.data import AnyShot
 from quadfringe.decoding import detail, params
 from quadfringe.decoding.cause import Cause
+from quadfringe.decoding.closures import Closure
 from quadfringe.decoding.fringe_fit import Fit
 from quadfringe.decoding.plan import Plan
-from quadfringe.decoding.symptoms import Closure
 
 __all__ = ["blur", "vanishing"]
 

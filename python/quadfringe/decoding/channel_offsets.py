@@ -16,6 +16,7 @@ channels share does not move the fringes of the others.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -23,14 +24,17 @@ from numpy.typing import NDArray
 
 from quadfringe import _core
 from quadfringe.data import AnyShot, Shape
+from quadfringe.decoding import closure_params as limits
 from quadfringe.decoding import params
 from quadfringe.decoding._kernel import KernelDecoder, rows_of_calibration
 from quadfringe.decoding.cause import ORDERS, Cause
-from quadfringe.decoding.causes import NUMBERS_FIX, family, listed, registration, wrong_order_rad
+from quadfringe.decoding.closures import Angle, Closure, closing_steps, closure_of
 from quadfringe.decoding.fringe_fit import infrared_column
+from quadfringe.decoding.number_ratios import NUMBERS_FIX, FringeNumbers, agree, family, listed, measured
 from quadfringe.decoding.plan import Plan
 from quadfringe.decoding.readings import rows_of
-from quadfringe.decoding.symptoms import Angle, Closure, closing_steps, closure_of, linear_light_of
+from quadfringe.decoding.registration import registration, wrong_order_rad
+from quadfringe.decoding.symptoms import linear_light_of
 from quadfringe.decoding.trusted import take_out, trusted_part
 
 __all__ = ["Offsets", "contradiction", "decoded_closure", "drifting", "offsets_of", "taken_out"]
@@ -77,7 +81,7 @@ def contradiction(shape: Shape, shot: AnyShot, plan: Plan) -> Cause | None:
     if offsets.turn_rad.size < params.OFFSET_TILES_MIN:
         return None
     shifted = _shifted(offsets, shape, shot, plan)
-    if shifted is None and (numbers := _numbers(offsets, plan)):
+    if shifted is None and (numbers := _numbers(offsets, shape, shot, plan)):
         return numbers
     if (shifted is None or not shifted.fatal) and (found := _in_part(offsets, plan)):
         part = _where_it_fits(found, shape, shot, plan)
@@ -141,22 +145,54 @@ def _shifted(offsets: Offsets, shape: Shape, shot: AnyShot, plan: Plan) -> Cause
     return Cause("infrared registration", words, fix)
 
 
-def _numbers(offsets: Offsets, plan: Plan) -> Cause | None:
-    """Find fringe numbers that are not those of the shot, by offsets that drift over the field."""
-    first, second, third = numbers = plan.fringes.numbers
-    infrared = first / (first - third) * offsets.third_rad
-    found: tuple[float, ...] = numbers
-    if drift := _drift(infrared, offsets.turn_rad):
-        found = (first + drift, second + drift, third + drift)
-    # Crosstalk of red and green turns the closure too, but leaves infrared at its place.
-    elif (steps := closing_steps(numbers)) and abs(_mean(infrared)) < params.STEADY_MIN:
-        drift = _drift(offsets.closure_rad(numbers), offsets.turn_rad)
-        found = family(max(steps - drift, 1))
-    if drift == 0:
+def _numbers(offsets: Offsets, shape: Shape, shot: AnyShot, plan: Plan) -> Cause | None:
+    """Find fringe numbers that are not those of the shot, by offsets that drift over the field.
+
+    Numbers are proposed if both ratios of the shot agree with them. A drift that agrees with none, in a shot with the
+    ratios of its numbers, has another cause. Both ratios must confirm a drift of tiles that scatter.
+    """
+    found = _by_drift(offsets, plan, params.DRIFT_LENGTH)
+    doubtful = () if found else _by_drift(offsets, plan, _beyond_chance(offsets.turn_rad.size))
+    if not found and not doubtful:
         return None
-    words = f"the fringe numbers {listed(numbers)} are not those of this shot: the offsets of the channels drift by "
-    words += f"{abs(drift)} turn{'s' if abs(drift) > 1 else ''} over the field, which fits {listed(found)}"
-    return Cause("fringe numbers", words, NUMBERS_FIX)
+    words = f"the fringe numbers {listed(plan.fringes.numbers)} are not those of this shot: the offsets of the "
+    words += "channels drift over the field, "
+    closure = closure_of(shot, plan, np.isfinite(shape.quality))
+    kept = closure is not None and agree(plan.fringes.numbers, plan, closure)
+    fitting = [one for one in (*found, *doubtful) if closure is None or agree(one, plan, closure)]
+    if len(fitting) == 1 and (found or not kept):
+        return Cause("fringe numbers", f"{words}which fits {listed(fitting[0])}", NUMBERS_FIX)
+    if closure is None or not found or (kept and not fitting):
+        return None
+    return Cause("fringe numbers", f"{words}and {measured(plan, closure)}", NUMBERS_FIX)
+
+
+def _beyond_chance(tiles: int) -> float:
+    """Give the length of a mean phasor over tiles that chance exceeds for one drift in a thousand searches."""
+    searched = 2 * params.DRIFT_TURNS_MAX + 1
+    return float(np.sqrt(np.log(searched / limits.DRIFT_BY_CHANCE) / tiles))
+
+
+def _by_drift(offsets: Offsets, plan: Plan, least: float) -> list[FringeNumbers]:
+    """Give the fringe numbers that the drifts of both sums allow, of this length; none when neither drifts.
+
+    With numbers n, n - d and m the closure drifts by m - n + k d turns, and the offset of infrared by n less that of
+    the plan, less N / k d times the drift of the closure.
+    """
+    first, second, third = numbers = plan.fringes.numbers
+    infrared, turn_rad = first / (first - third) * offsets.third_rad, offsets.turn_rad
+    steps, closed = closing_steps(numbers), [0]
+    # Crosstalk of red and green turns the closure too, but leaves infrared at its place.
+    if steps and abs(_mean(infrared)) < params.STEADY_MIN:
+        closed = _drifts(offsets.closure_rad(numbers), turn_rad, least) or [0]
+    most = params.DRIFT_TURNS_MAX if closed == [0] else limits.CLOSED_TURNS_MAX
+    found: list[FringeNumbers] = []
+    for drift, more in product(_drifts(infrared, turn_rad, least, most), closed):
+        shift = drift - first * more / (first - third)
+        found.append((first + shift, second + shift, third + shift + more))
+    found += [family(max(steps - more, 1)) for more in closed if steps and more]
+    whole = [one for one in found if all(number > 0 and number == round(number) for number in one)]
+    return list(dict.fromkeys(whole))
 
 
 def _in_part(offsets: Offsets, plan: Plan) -> Cause | None:
@@ -191,12 +227,19 @@ def _where_it_fits(cause: Cause, shape: Shape, shot: AnyShot, plan: Plan) -> Cau
     return replace(cause, found=f"{cause.found}; the {part.mean():.0%} of the image that fit are returned", fatal=False)
 
 
-def _drift(angle_rad: Real, turn_rad: Real) -> int:
-    """Give the turns by which an angle drifts over the field; 0 unless a drift explains it clearly better than none."""
-    turns = np.arange(-params.DRIFT_TURNS_MAX, params.DRIFT_TURNS_MAX + 1)
+def _drifts(angle_rad: Real, turn_rad: Real, least: float, most: int = params.DRIFT_TURNS_MAX) -> list[int]:
+    """Give the turns by which an angle may drift over the field; none unless a drift explains it better than none.
+
+    The likelihood of tiles that scatter about a drift grows with the length of their mean phasor, the more the more
+    tiles there are and the less they scatter.
+    """
+    turns = np.arange(-most, most + 1)
     lengths = np.abs(np.exp(1j * (angle_rad - turns[:, np.newaxis] * turn_rad)).mean(axis=1))
-    best, still = int(lengths.argmax()), params.DRIFT_TURNS_MAX
-    return int(turns[best]) if lengths[best] > max(params.DRIFT_LENGTH, lengths[still] + params.DRIFT_BETTER) else 0
+    best = float(lengths.max())
+    if best <= max(least, lengths[most] + params.DRIFT_BETTER):
+        return []
+    near = lengths >= best - limits.LIKELIER * (1 - best) / turn_rad.size
+    return [int(turn) for turn in turns[near]]
 
 
 def _mean(angle_rad: Real) -> complex:

@@ -13,17 +13,17 @@ from numpy.typing import NDArray
 
 from quadfringe.data import AnyShot, Reason, Shape
 from quadfringe.decoding import params
-from quadfringe.decoding.plan import Plan
-from quadfringe.decoding.plausibility import BOUNDED
-from quadfringe.decoding.symptoms import (
+from quadfringe.decoding.closures import (
     Closure,
     closed_wave,
     closure_of_waves,
-    linear_light_of,
     local_mean,
     local_rates,
     waves_of,
 )
+from quadfringe.decoding.plan import Plan
+from quadfringe.decoding.plausibility import BOUNDED
+from quadfringe.decoding.symptoms import linear_light_of
 
 __all__ = ["is_scattered", "take_out", "trusted_part"]
 

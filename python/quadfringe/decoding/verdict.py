@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import params
@@ -13,24 +14,16 @@ from quadfringe.decoding._kernel import KernelDecoder
 from quadfringe.decoding.agreement import Agreement
 from quadfringe.decoding.blur import vanishing
 from quadfringe.decoding.cause import ORDERS, Cause
-from quadfringe.decoding.causes import (
-    NUMBERS_FIX,
-    after_order,
-    along_rows,
-    before_order,
-    channels_fit,
-    listed,
-    other_numbers,
-    period_fix,
-    strange,
-    wrong_bits,
-)
+from quadfringe.decoding.causes import after_order, along_rows, before_order, period_fix, wrong_bits
 from quadfringe.decoding.channel_offsets import drifting
+from quadfringe.decoding.closure_params import RATIO_SD
+from quadfringe.decoding.closures import Closure, closure_of
 from quadfringe.decoding.given import blind_channels, copied, same_images
+from quadfringe.decoding.number_ratios import NUMBERS_FIX, agree, channels_fit, listed, other_numbers, strange
 from quadfringe.decoding.plan import Plan
 from quadfringe.decoding.plausibility import mirrored
 from quadfringe.decoding.readings import Reading, band_of, other_readings, rows_of
-from quadfringe.decoding.symptoms import Closure, closure_of, saturation
+from quadfringe.decoding.symptoms import saturation
 from quadfringe.decoding.trusted import is_scattered, take_out, trusted_part
 from quadfringe.errors import DecodeError
 
@@ -182,11 +175,14 @@ def _refuse_numbers(shape: Shape, shot: AnyShot, decoder: KernelDecoder) -> None
     if cause := along_rows(shot, decoder.plan):
         raise cause.error
     part, band = _band(shape, shot, decoder)
-    closure = closure_of(band, part.plan)
-    if closure is None or channels_fit(closure):
+    closure = closure_of(band, part.plan, _lit_band(shape))
+    others = [] if closure is None else other_numbers(part.plan, closure)
+    if closure is not None and channels_fit(closure):
+        others = [one for one in others if agree(one, part.plan, closure, RATIO_SD)]  # over few fringes, several do
+    if not others:
         return
     given = order_margin(part.shape(band))
-    margins = {one: order_margin(part.with_numbers(one).shape(band)) for one in other_numbers(part.plan, closure)}
+    margins = {one: order_margin(part.with_numbers(one).shape(band)) for one in others}
     numbers, found = max(margins.items(), key=lambda each: each[1], default=(None, 0.0))
     if numbers and found > max(limits.CLEARLY_BETTER * given, limits.DOUBTFUL):
         words = f"the fringe numbers {listed(decoder.plan.fringes.numbers)} are not those of this shot: with the "
@@ -201,12 +197,13 @@ def _refuse_green(shape: Shape, shot: AnyShot, decoder: KernelDecoder) -> None:
     Without infrared every pair of phases has an order, so that exchanged channels leave the margin as it is.
     """
     part, band = _band(shape, shot, decoder)
-    closure = closure_of(band, part.plan)
+    lit = _lit_band(shape)
+    closure = closure_of(band, part.plan, lit)
     if closure is None or abs(closure.green - 1) < limits.GREEN_OFF:
         return
     if twice := same_images(shot):
         raise twice.error
-    orders = [] if abs(closure.green + 1) < limits.GREEN_OFF else _with_green(other_readings(band), part.plan)
+    orders = [] if abs(closure.green + 1) < limits.GREEN_OFF else _with_green(other_readings(band), part.plan, lit)
     if orders:
         words = " or ".join(one.found for one in orders)
     elif abs(closure.green + 1) < limits.GREEN_OFF:
@@ -220,9 +217,9 @@ def _refuse_green(shape: Shape, shot: AnyShot, decoder: KernelDecoder) -> None:
     raise Cause(ORDERS, words, fix).error
 
 
-def _with_green(readings: list[Reading], plan: Plan) -> list[Reading]:
+def _with_green(readings: list[Reading], plan: Plan, lit: NDArray[np.bool_]) -> list[Reading]:
     """Give the readings in which green has its frequency and runs along with the others."""
-    closures = [(one, closure_of(one.shot, plan)) for one in readings]
+    closures = [(one, closure_of(one.shot, plan, lit)) for one in readings]
     return [one for one, closure in closures if closure is not None and abs(closure.green - 1) < limits.GREEN_EXACT]
 
 
@@ -243,7 +240,8 @@ def _agrees(agreement: Agreement, shape: Shape, shot: AnyShot, margin: float, de
     if margin < limits.AGREEING_MIN or not agreement.in_the_mean:
         return False
     part, band = _band(shape, shot, decoder)
-    others = [order_margin(part.shape(one.shot)) for one in _possible(other_readings(band), part)]
+    readings = _possible(other_readings(band), part, _lit_band(shape))
+    others = [order_margin(part.shape(one.shot)) for one in readings]
     return order_margin(part.shape(band)) > limits.CLEARLY_BETTER * max(others, default=0.0)
 
 
@@ -257,16 +255,23 @@ def _plausible(suspects: list[Reading], shape: Shape, least: float, decoder: Ker
         return suspects
     part, near = decoder.for_rows(first, count), limits.NEAR[decoder.settings["method"]] * least
     bands = {one.found: replace(one, shot=rows_of(one.shot, first, count)) for one in suspects}
-    found = {one.found for one in _possible([*bands.values()], part) if order_margin(part.shape(one.shot)) >= near}
+    possible = _possible([*bands.values()], part, _lit_band(shape))
+    found = {one.found for one in possible if order_margin(part.shape(one.shot)) >= near}
     return [one for one in suspects if one.found in found]
 
 
-def _possible(readings: list[Reading], decoder: KernelDecoder) -> list[Reading]:
-    """Give the readings whose channels have about the frequencies of the fringe numbers."""
-    return [one for one in readings if not strange(closure_of(one.shot, decoder.plan))]
+def _possible(readings: list[Reading], decoder: KernelDecoder, lit: NDArray[np.bool_]) -> list[Reading]:
+    """Give the readings whose channels have about the frequencies of the fringe numbers where it is `lit`."""
+    return [one for one in readings if not strange(closure_of(one.shot, decoder.plan, lit))]
 
 
 def _band(shape: Shape, shot: AnyShot, decoder: KernelDecoder) -> tuple[KernelDecoder, AnyShot]:
     """Give the decoder and the shot of the band of rows with most light."""
     first, count = band_of(shape)
     return decoder.for_rows(first, count), rows_of(shot, first, count)
+
+
+def _lit_band(shape: Shape) -> NDArray[np.bool_]:
+    """Say which pixels of that band are lit: dark ground around an object has any frequencies, by chance."""
+    first, count = band_of(shape)
+    return np.isfinite(shape.quality[first : first + count])

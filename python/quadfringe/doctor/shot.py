@@ -11,14 +11,16 @@ from quadfringe.config import Response
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import Decoder, Plan, fit_params
 from quadfringe.decoding.blur import blur
-from quadfringe.decoding.causes import registration, wrong_bits
+from quadfringe.decoding.causes import wrong_bits
 from quadfringe.decoding.channel_offsets import contradiction, decoded_closure
+from quadfringe.decoding.closures import closure_of
 from quadfringe.decoding.fringe_fit import Fit, fit_fringes
 from quadfringe.decoding.light_border import BY_HAND, borders_of
 from quadfringe.decoding.pair_drift import infrared_drift
 from quadfringe.decoding.plan import stated_response
 from quadfringe.decoding.plausibility import geometry_of, implausible
-from quadfringe.decoding.symptoms import brightness, closure_of, saturation
+from quadfringe.decoding.registration import registration
+from quadfringe.decoding.symptoms import brightness, saturation
 from quadfringe.doctor.finding import Finding, graded, told
 from quadfringe.errors import DecodeError, DecodeWarning
 
@@ -81,7 +83,7 @@ def _rank(one: Finding) -> tuple[int, int]:
 
 def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> list[Finding]:
     """Check the fringes of a decoded shot, channel by channel and against one another."""
-    closure = closure_of(shot, plan)
+    closure = closure_of(shot, plan, np.isfinite(shape.quality))
     fit = fit_fringes(shot, shape, plan)
     moved = contradiction(shape, shot, plan) or registration(shot, plan, decoded_closure(closure, shape, shot, plan))
     named = [moved, blur(shot, fit, plan, closure)]
