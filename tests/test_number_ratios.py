@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from support.halves import changed, cut_out, half_plan, half_shot
+from support.halves import changed, half_plan, half_shot
 
 import quadfringe as qf
 from quadfringe.decoding import closure_params
@@ -51,7 +51,7 @@ def test_numbers_with_the_same_differences_are_named_on_narrow_objects(numbers: 
 def test_exchanged_channels_of_a_small_object_are_named(
     pair: tuple[str, str], scene: str, share: float, seed: int
 ) -> None:
-    shot = changed(cut_out(half_shot(scene, seed), share, seed), broken.exchanged(*pair))
+    shot = changed(broken.cut_out(half_shot(scene, seed), share, seed), broken.exchanged(*pair))
     name, words = told(shot)
     assert name == "fringe orders"
     assert f"{pair[0]} and {pair[1]} seem to be swapped" in words
@@ -59,7 +59,7 @@ def test_exchanged_channels_of_a_small_object_are_named(
 
 @pytest.mark.parametrize(("scene", "share", "seed"), [("face", 0.06, 31), ("sphere", 0.08, 33)])
 def test_other_numbers_of_a_small_object_are_named(scene: str, share: float, seed: int) -> None:
-    name, words = told(cut_out(half_shot(scene, seed, (25.0, 24.0, 20.0)), share, seed))
+    name, words = told(broken.cut_out(half_shot(scene, seed, (25.0, 24.0, 20.0)), share, seed))
     assert name == "fringe numbers"
     assert "which fits 25, 24, 20" in words
 

@@ -1,16 +1,14 @@
 """What the phases of the channels say to each other on a decoded shot: infrared that is shifted, other fringe numbers.
 
-A decoded phase says where the fringes of green and infrared must lie. Where they lie instead, their offsets tell, in a
-few bands of rows, to save time. For fringe numbers N, N - 1 and N - k two sums of the offsets show faults
-that a wrong order hides, because a wrong order leaves them as they are:
+A decoded phase says where the fringes of green and infrared must lie. Their offsets tell where they lie, in a few bands
+of rows, to save time. For fringe numbers N, N - 1 and N - k a wrong order leaves two sums of the offsets as they are:
 
 - offset of infrared + (k - 1) times that of red - k times that of green: the closure of the three phases. A shift of
   infrared turns it by its phase; numbers with another k let it drift by a turn over the field for each k.
 - N / k times the offset of infrared: numbers with the same differences, such as 37, 36, 31 in place of 36, 35, 30, let
   it drift by a turn for each fringe.
 
-Where red and blue are a quarter period apart, they give the brightness of every pixel, so that texture that all
-channels share does not move the fringes of the others.
+Red and blue a quarter period apart give the brightness of every pixel, so that print does not move the other fringes.
 """
 
 from __future__ import annotations
@@ -93,8 +91,7 @@ def contradiction(shape: Shape, shot: AnyShot, plan: Plan) -> Cause | None:
 def decoded_closure(closure: Closure | None, shape: Shape, shot: AnyShot, plan: Plan) -> Closure | None:
     """Give a closure with the angle that the decoded phase shows, if enough of it is decoded.
 
-    A strong response bends the phase of red and blue as it is read from their light, and k - 1 times that turns the
-    closure by anything. Offsets from the decoded phase are those of the fringes, without their harmonics.
+    A strong response bends the phase as it is read from the light. The decoded one is that without the harmonics.
     """
     if closure is None or len(plan.fringes.numbers) < 3:
         return closure
@@ -106,15 +103,12 @@ def decoded_closure(closure: Closure | None, shape: Shape, shot: AnyShot, plan: 
 
 
 def taken_out(shape: Shape, shot: AnyShot, plan: Plan, seen: Shape) -> Cause | None:
-    """Name what the channels contradict in the parts that the decoder took out, which are still in `seen`.
-
-    What does not fit of the rest becomes no data, in place.
-    """
+    """Name what the channels contradict in what the decoder took out, which `seen` has; hide what else does not fit."""
     cause = _in_part(offsets_of(seen, shot, plan), plan)
     if cause is None:
         share = np.count_nonzero(shape.quality == 0) / np.count_nonzero(np.isfinite(shape.quality))
-        words = f"in {share:.0%} of the pixels with fringes, green and infrared contradict every fringe order"
-        cause = Cause(ORDERS, f"{words}, and these are no data", CONTRADICTED_FIX)
+        words = f"in {share:.0%} of the pixels with fringes, green and infrared contradict every fringe order, and "
+        cause = Cause(ORDERS, words + "these are no data", CONTRADICTED_FIX)
     return replace(_where_it_fits(cause, shape, shot, plan), fatal=False)
 
 

@@ -28,7 +28,8 @@ SD_OF_DEVIATION = 1.4826
 RATIO_SD, EXACT_SD = 0.004, 0.001
 # Twice the logarithm of the likelihood by which numbers must explain two ratios better than others do. 6 is a factor of
 # 20. A larger number leaves other numbers on objects of few fringes unnamed: 25, 24, 20 on a sphere of 8 % of the frame
-# has 6.3. A smaller one takes shifted infrared on such objects for other numbers: 12 px on a face of 6 % have 0.1.
+# has 6.3. A smaller one takes shifted infrared on such objects for other numbers: 12 px on a face of 6 % have 0.1
+# (`pytest tests/test_number_ratios.py tests/test_registration.py` have both).
 LIKELIER = 6.0
 # The same for numbers that are not of a family, which fit any two ratios. Follows from a deviation of four errors.
 OFF_THE_PLAN = 16.0
@@ -56,6 +57,7 @@ SHIFT_REACH = 0.1
 # smaller number finds whole fringes by chance, a larger one names shifts of half a fringe with the wrong sign.
 LONGER = 4.0
 # Mean of the closure over its local length from which a shift is believed where noise leaves the local length below
-# `AGREEMENT_MIN`. Noise and exchanged channels have 0.76 at most, clutter with a shift of 0.8 px has 0.95 or more. A
-# smaller number believes noise, a larger one misses small shifts on dark objects.
+# `AGREEMENT_MIN`. Noise and exchanged channels have 0.76 at most, clutter with a shift of 0.8 px has 0.95 or more
+# (`python evaluation/diagnosis.py --figures`, `pytest tests/test_registration.py`). A smaller number believes noise, a
+# larger one misses small shifts on dark objects.
 STEADY_ALONE = 0.9

@@ -1,4 +1,4 @@
-"""Least squares with the errors that its own tiles tell: each tile is left out once.
+"""Least squares with errors that the tiles of an image tell: each tile is left out once.
 
 Neighbouring pixels share print, shading and what smooths them, so that their number says little about an error. Tiles
 as wide as these reach are nearly independent. Waves that are nearly alike over a narrow object get the large errors

@@ -25,16 +25,17 @@ from quadfringe.decoding.symptoms import rows_match
 __all__ = ["registration", "wrong_order_rad"]
 
 
-def registration(shot: AnyShot, plan: Plan, closure: Closure | None) -> Cause | None:
+def registration(shot: AnyShot, plan: Plan, closure: Closure | None, *, pure: bool = True) -> Cause | None:
     """Find an infrared image that is shifted from the visible one, and the shift that mends it.
 
     It is fatal from half the angle of a wrong order on: then orders are wrong, or nearly so. A shift along y leaves
-    upright fringes where they are, and does harm at edges only.
+    upright fringes where they are, and does harm at edges only. With crosstalk the channels are not `pure`: it lets the
+    closure swing over the field as shifts by whole fringes do, so that these are not looked for.
     """
     if closure is None or not plan.fringes.infrared or not _closes(closure):
         return None
     fits = closure.off < params.RATIO_OFF or _within_errors(closure, plan)
-    whole_px = _whole_fringes_px(plan, closure, fits=fits)
+    whole_px = _whole_fringes_px(plan, closure, fits=fits) if pure else None
     if whole_px is None and not fits:
         return None
     turned = abs(closure.angle.rad) > params.CLOSURE_RAD and closure.angle.steady > params.STEADY_MIN

@@ -82,7 +82,7 @@ class Fault:
 
     strength: str
     options: dict[str, Any] | None = None
-    numbers: tuple[float, float, float] | None = None
+    numbers: tuple[float, ...] | None = None
     change: Change | None = None
 
 
