@@ -49,6 +49,6 @@ pub const EXPONENT_MAX: f32 = 80.0;
 /// Least probability of a pixel whose order its region settles: the observed share of wrong orders, 0.0021 on the half `tune` of
 /// `python evaluation/world.py`. Half and twice the value are half and twice what these pixels state.
 pub const SETTLED_PROBABILITY_MIN: f32 = 0.0025;
-/// The same for pixels that were added by region growing, because some of them belong to another surface: observed 0.016 on the half
+/// The same for pixels that were added by region growing, because some of them belong to another surface: observed 0.018 on the half
 /// `tune` of `python evaluation/world.py`.
 pub const GROWN_PROBABILITY_MIN: f32 = 0.02;
