@@ -26,7 +26,7 @@ KINDS: dict[str, dict[tuple[int, int], float]] = {
 
 
 def counts(shot: qf.Shot, plan: qf.Plan) -> dict[str, bool]:
-    """Say what the doctor says of a shot."""
+    """List what the doctor reports for a shot."""
     found = examine_shot(shot, plan)
     grade = next((one.grade for one in found if one.name == "crosstalk"), "")
     return {

@@ -3,7 +3,8 @@
     python evaluation/saturated.py [--half tune|report] [--only SCENE ...]
 
 The intensities of scenes of quadfringe.evaluation.world, and of the real captures, are multiplied by a factor and cut
-off at full scale. `sat 1` and `sat 2` are the shares of the pixels with at least one and two saturated channels. Errors
+off at full scale. `sat 1` and `sat 2` are the shares of the pixels with at least one and two saturated channels, `tile`
+the greatest share of a tile of 32 px with a saturated channel and two that are not, over all seeds. Errors
 of scenes are those of returned pixels with the right order, in mm; those of captures are phases in rad. Highlights
 have a radius in px and a gain: their light is up to 1 + gain times that of the scene; figures are those inside.
 Returned and
@@ -23,7 +24,7 @@ import numpy as np
 import quadfringe as qf
 from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import world
-from quadfringe.evaluation._saturated import Highlight, overexposed, saturated_share
+from quadfringe.evaluation._saturated import Highlight, fullest_tile, overexposed, saturated_share
 from quadfringe.evaluation._variants import stepped
 
 HALVES = {"tune": world.TUNE, "report": world.REPORT}
@@ -32,17 +33,17 @@ SCENES = ("face", "steps", "painted_face", "glossy_face", "peaks_patches_20", "c
 FACTORS = (1.0, 1.15, 1.3, 1.6)
 SHINY = ("face", "steps", "painted_face")
 HIGHLIGHTS = tuple(Highlight((500.0, 384.0), *spot) for spot in ((25.0, 2.0), (45.0, 2.0), (45.0, 4.0), (90.0, 3.0)))
-COLUMNS = (
-    f"{'':18}{'times':>6}{'sat 1 %':>9}{'sat 2 %':>9}{'RMS':>9}{'median':>9}{'99 %':>8}{'back %':>8}{'wrong %':>9}"
-)
+COLUMNS = f"{'':18}{'times':>6}{'sat 1 %':>9}{'sat 2 %':>9}{'tile %':>8}"
+    f"{'RMS':>9}{'median':>9}{'99 %':>8}{'back %':>8}{'wrong %':>9}"
 
 
-def row(name: str, times: str, shares: list[np.ndarray], figures: list[dict[str, float]]) -> str:
+def row(name: str, times: str, shots: list[qf.Shot], figures: list[dict[str, float]]) -> str:
     """Give one line of the table, the mean of some shots."""
-    one, two, _ = 100 * np.mean(shares, axis=0)
+    one, two, _ = 100 * np.mean([saturated_share(shot) for shot in shots], axis=0)
+    tile = 100 * max(fullest_tile(shot) for shot in shots)
     mean = {key: fmean(figure[key] for figure in figures) for key in figures[0]}
     return (
-        f"{name:18}{times:>6}{one:9.1f}{two:9.1f}{mean['rms']:9.4f}{mean['median']:9.4f}{mean['p99']:8.3f}"
+        f"{name:18}{times:>6}{one:9.1f}{two:9.1f}{tile:8.1f}{mean['rms']:9.4f}{mean['median']:9.4f}{mean['p99']:8.3f}"
         f"{mean['returned']:8.2f}{mean['wrong']:9.4f}"
     )
 
@@ -69,12 +70,12 @@ def of_takes(name: str, times: str, takes: list[world.Take], shots: list[qf.Shot
     for taken, shot in zip(takes, shots, strict=True):
         judged = asdict(world.judge(qf.Decoder(shot, plan).decode_without_verdict(shot), taken))
         figures.append({key.removesuffix("_mm").removesuffix("_percent"): value for key, value in judged.items()})
-    return row(name, times, [saturated_share(shot) for shot in shots], figures)
+    return row(name, times, shots, figures)
 
 
 def of_capture(data: Path, name: str, factor: float, offsets: tuple[int, ...]) -> str:
     """Measure a real capture, whose response is left as it is."""
-    shares, figures = [], []
+    shots, figures = [], []
     for offset in offsets:
         scene = stepped(data, name, offset)
         shot = overexposed(qf.Shot(scene.red, scene.green, scene.blue, scene.ir), factor)
@@ -82,7 +83,7 @@ def of_capture(data: Path, name: str, factor: float, offsets: tuple[int, ...]) -
         error = np.where(scene.scored, shape.phase_rad - scene.phase_rad, np.nan)
         returned, right = np.isfinite(error), np.abs(error) < np.pi
         errors = np.abs(error[right])
-        shares.append(saturated_share(shot))
+        shots.append(shot)
         figures.append(
             {
                 "rms": float(np.sqrt(np.mean(errors**2))),
@@ -92,7 +93,7 @@ def of_capture(data: Path, name: str, factor: float, offsets: tuple[int, ...]) -
                 "wrong": float(100 * (1 - right.sum() / returned.sum())),
             }
         )
-    return row(name, f"{factor:.2f}", shares, figures)
+    return row(name, f"{factor:.2f}", shots, figures)
 
 
 def main() -> None:

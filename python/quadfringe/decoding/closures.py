@@ -143,7 +143,7 @@ def _error_of_median(ratio: Map) -> float:
 
 
 def in_squares(values: NDArray[Any], side: int) -> NDArray[Any]:
-    """Cut a map into squares, (squares, side * side); what is left at the right and the lower edge is left out."""
+    """Cut a map into squares, (squares, side * side). The rest at the right and lower edges is dropped."""
     rows, columns = (size // side for size in values.shape)
     parts = values[: rows * side, : columns * side].reshape(rows, side, columns, side)
     return parts.swapaxes(1, 2).reshape(rows * columns, side * side)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from quadfringe.data import AnyShot
 from quadfringe.decoding import params
@@ -14,15 +17,8 @@ __all__ = ["coarse_contrast", "fine_over_coarse", "sharpness", "steepness"]
 
 def sharpness(shot: AnyShot) -> float:
     """Give the strongest detail of a few px over the noise of the same scale; about 1.4 when there is only noise."""
-    import cv2
-
-    found = []
-    for image in shot.channels.values():
-        light = image.astype(np.float32)
-        detail = cv2.GaussianBlur(light, (0, 0), 1.5) - cv2.GaussianBlur(light, (0, 0), 3.0)
-        noise = 1.4826 * float(np.median(np.abs(detail - np.median(detail))))
-        found.append(float(np.quantile(np.abs(detail), 0.995)) / max(noise, 1e-9))
-    return float(np.median(found))
+    fine = (_between(image, 1.5, 3.0) for image in shot.channels.values())
+    return float(np.median([float(np.quantile(np.abs(one), 0.995)) / max(_noise(one), 1e-9) for one in fine]))
 
 
 def steepness(shot: AnyShot) -> float:
@@ -35,11 +31,10 @@ def steepness(shot: AnyShot) -> float:
 
     found = []
     for image in shot.channels.values():
-        smooth = [cv2.GaussianBlur(image.astype(np.float32), (0, 0), sigma) for sigma in (1.5, 3.0, 6.0)]
-        fine, near = smooth[0] - smooth[1], cv2.dilate(np.abs(smooth[1] - smooth[2]), np.ones((13, 13), np.uint8))
-        noise = 1.4826 * float(np.median(np.abs(fine - np.median(fine))))
-        strongest = np.abs(fine) >= np.quantile(np.abs(fine), 0.995)
-        power = float(np.mean(fine[strongest] ** 2)) - noise**2
+        fine, near = (np.abs(_between(image, *sigmas)) for sigmas in ((1.5, 3.0), (3.0, 6.0)))
+        near = cv2.dilate(near, np.ones((13, 13), np.uint8))
+        strongest = fine >= np.quantile(fine, 0.995)
+        power = float(np.mean(fine[strongest] ** 2)) - _noise(_between(image, 1.5, 3.0)) ** 2
         found.append(np.sqrt(max(power, 0.0) / max(float(np.mean(near[strongest] ** 2)), 1e-9)))
     return float(np.median(found))
 
@@ -64,11 +59,21 @@ def coarse_contrast(shot: AnyShot, plan: Plan) -> float:
 
 def fine_over_coarse(shot: AnyShot) -> float:
     """Give the strongest detail of a few px over that of four times the size: 1 for sharp edges, less with blur."""
-    import cv2
-
     found = []
     for image in shot.channels.values():
-        smooth = [cv2.GaussianBlur(image.astype(np.float32), (0, 0), sigma) for sigma in (1.5, 3.0, 6.0, 12.0)]
-        fine, coarse = (np.quantile(np.abs(smooth[i] - smooth[i + 1]), 0.995) for i in (0, 2))
+        fine, coarse = (np.quantile(np.abs(_between(image, *sigmas)), 0.995) for sigmas in ((1.5, 3.0), (6.0, 12.0)))
         found.append(float(fine) / max(float(coarse), 1e-9))
     return float(np.median(found))
+
+
+def _between(image: NDArray[Any], fine_px: float, coarse_px: float) -> NDArray[np.float32]:
+    """Give the detail of an image between two standard deviations of a Gaussian."""
+    import cv2
+
+    light = image.astype(np.float32)
+    return np.asarray(cv2.GaussianBlur(light, (0, 0), fine_px) - cv2.GaussianBlur(light, (0, 0), coarse_px), np.float32)
+
+
+def _noise(detail: NDArray[np.float32]) -> float:
+    """Give the standard deviation of the noise in detail that covers little of an image, from its median deviation."""
+    return 1.4826 * float(np.median(np.abs(detail - np.median(detail))))

@@ -9,7 +9,7 @@ nearly the same, so that every ratio comes with the least value that it has for 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,13 +90,31 @@ def fit_fringes(shot: AnyShot, shape: Shape, plan: Plan) -> Fit | None:
         wave = light[name].ravel()[pixels] / background - 1
         equations = normal_equations(np.hstack([shown, twice]), wave.astype(np.float64), starts)
         found.append(_channel(equations, i, float(np.median(background))))
-    return Fit(plan.fringes.channels, *(np.array(each) for each in zip(*found, strict=True)))
+    return Fit(
+        plan.fringes.channels,
+        amplitude=np.array([one.contrast * one.light for one in found]),
+        harmonic=np.array([one.harmonic for one in found]),
+        crosstalk=np.stack([one.crosstalk for one in found]),
+        contrast=np.array([one.contrast for one in found]),
+        harmonic_least=np.array([one.harmonic_least for one in found]),
+        crosstalk_least=np.stack([one.crosstalk_least for one in found]),
+    )
 
 
-def _channel(
-    equations: Jackknife, own: int, light: float
-) -> tuple[float, float, NDArray[np.float64], float, float, Any]:
-    """Solve the equations of a channel: the figures of a `Fit`, in their order."""
+@dataclass(frozen=True)
+class _Channel:
+    """What a `Fit` tells of one captured channel, and its mean light, share of full scale."""
+
+    light: float
+    contrast: float
+    harmonic: float
+    harmonic_least: float
+    crosstalk: Wave
+    crosstalk_least: Wave
+
+
+def _channel(equations: Jackknife, own: int, light: float) -> _Channel:
+    """Solve the equations of a channel."""
     count = equations.sides.shape[1] - 3
 
     def ratios(found: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -107,8 +125,8 @@ def _channel(
     # Without the waves of the others, which are nearly the same across a narrow object and share its contrast at will.
     contrast = abs(float(equations.solved([own, count, count + 1, count + 2])[0]))
     found = equations.solved()
-    (harmonic, *_), (harmonic_least, *least) = equations.least(ratios)
-    return contrast * light, harmonic, found[:count] / found[own], contrast, harmonic_least, least
+    whole, least = equations.least(ratios)
+    return _Channel(light, contrast, float(whole[0]), float(least[0]), found[:count] / found[own], least[1:])
 
 
 class Waves(NamedTuple):

@@ -85,9 +85,10 @@ def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> list[Finding]:
     """Check the fringes of a decoded shot, channel by channel and against one another."""
     closure = closure_of(shot, plan, np.isfinite(shape.quality))
     fit = fit_fringes(shot, shape, plan)
-    closed = decoded_closure(closure, shape, shot, plan)
-    pure = fit is None or fit.worst_stray.least <= fit_params.SOUND
-    moved = contradiction(shape, shot, plan) or registration(shot, plan, closed, pure=pure)
+    moved = contradiction(shape, shot, plan)
+    if moved is None:
+        pure = fit is None or fit.worst_stray.least <= fit_params.SOUND
+        moved = registration(shot, plan, decoded_closure(closure, shape, shot, plan), pure=pure)
     named = [moved, blur(shot, fit, plan, closure)]
     if fit is None:
         words = "too few pixels carry fringes to check response and crosstalk"

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from quadfringe.data import Shot
 
-__all__ = ["Highlight", "overexposed", "saturated_share"]
+__all__ = ["Highlight", "fullest_tile", "overexposed", "saturated_share"]
 
 
 @dataclass(frozen=True)
@@ -48,3 +48,13 @@ def saturated_share(shot: Shot) -> NDArray[np.float64]:
     """Give the shares of the pixels with at least one, two and three saturated channels."""
     count = np.sum([image == 255 for image in shot.channels.values()], axis=0)
     return np.array([np.mean(count >= least) for least in (1, 2, 3)])
+
+
+def fullest_tile(shot: Shot, side_px: int = 32) -> float:
+    """Give the greatest share of a tile whose pixels have a saturated channel and two or more that are not."""
+    images = list(shot.channels.values())
+    count = np.sum([image == 255 for image in images], axis=0)
+    cut = (count > 0) & (len(images) - count >= 2)
+    rows, columns = (size // side_px for size in cut.shape)
+    tiles = cut[: rows * side_px, : columns * side_px].reshape(rows, side_px, columns, side_px)
+    return float(tiles.mean(axis=(1, 3)).max())

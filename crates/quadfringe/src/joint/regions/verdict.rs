@@ -1,4 +1,4 @@
-//! Step 8: what a region says of the order of its pixels, and with which certainty.
+//! Step 8: the order that a region gives its pixels, and how certain it is.
 
 use super::scores::Contradiction;
 use crate::joint::params::regions::{CERTAIN_EVIDENCE, CONTRADICTION_MAX, QUALITY};
