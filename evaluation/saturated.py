@@ -33,8 +33,10 @@ SCENES = ("face", "steps", "painted_face", "glossy_face", "peaks_patches_20", "c
 FACTORS = (1.0, 1.15, 1.3, 1.6)
 SHINY = ("face", "steps", "painted_face")
 HIGHLIGHTS = tuple(Highlight((500.0, 384.0), *spot) for spot in ((25.0, 2.0), (45.0, 2.0), (45.0, 4.0), (90.0, 3.0)))
-COLUMNS = f"{'':18}{'times':>6}{'sat 1 %':>9}{'sat 2 %':>9}{'tile %':>8}"
+COLUMNS = (
+    f"{'':18}{'times':>6}{'sat 1 %':>9}{'sat 2 %':>9}{'tile %':>8}"
     f"{'RMS':>9}{'median':>9}{'99 %':>8}{'back %':>8}{'wrong %':>9}"
+)
 
 
 def row(name: str, times: str, shots: list[qf.Shot], figures: list[dict[str, float]]) -> str:
