@@ -257,12 +257,16 @@ def _tilt_deg(points: NDArray[np.float32], right: NDArray[np.float32], below: ND
 
     Noise tilts every part of a surface in another direction, and a wrong calibration all of it in the same one.
     """
-    known = np.isfinite(points + right + below).all(-1)
-    if not known.any():
+    first, *others = (np.moveaxis(each, -1, 0).reshape(3, -1) for each in (points, right, below))
+    slopes = np.concatenate([first, *(other - first for other in others)])
+    slopes = slopes[:, np.isfinite(slopes.sum(axis=0))]
+    if slopes.shape[1] == 0:
         return float("nan")
-    here, along, down = (np.median(each[known], 0) for each in (points, right - points, below - points))
+    # Every decode waits for it: several times as fast as np.median.
+    middle = slopes.shape[1] // 2
+    sight, along, down = np.partition(slopes, middle, axis=1)[:, middle].reshape(3, 3)
     normal = np.cross(along, down)
-    cos = abs(normal @ here) / max(float(np.linalg.norm(normal) * np.linalg.norm(here)), 1e-30)
+    cos = abs(float(normal @ sight)) / max(float(np.linalg.norm(normal) * np.linalg.norm(sight)), 1e-30)
     return float(np.degrees(np.arccos(min(cos, 1.0))))
 
 
