@@ -38,8 +38,6 @@ pub(super) struct CoarseLevel {
     sums: CellMaps,
     /// Standard deviation of the intensities in linear light.
     pub noise: f32,
-    /// Whether the surface counts as textured, because enough pixels take offsets and amplitudes from another place.
-    pub textured: bool,
     pub lit_mask: LitMask,
     fit: LocalFit,
     pub slopes: Slopes,
@@ -60,7 +58,6 @@ impl CoarseLevel {
             work: Vec::new(),
             sums: CellMaps::default(),
             noise: 0.0,
-            textured: false,
             lit_mask: LitMask::new(absent(code.ratios())),
             fit: LocalFit::new(code.ratios()),
             slopes: Slopes::default(),
@@ -129,26 +126,20 @@ impl CoarseLevel {
     /// Steps 5 and 6, alternating: fits offset and amplitude of every channel, and with them the phase from all four
     /// channels.
     pub fn refine(&mut self, scene: &Scene<'_>, ratios: [f32; 4], moving: bool, mut scratch: Scratch<'_>) {
-        self.textured = false;
-        self.fit_phase(scene, ratios, scratch.lend());
+        self.fit_phase(scene, ratios, false, scratch.lend());
         let map = PhaseMap { phase: &self.phase, modulation: &self.smooth_modulation };
         self.photometry.fit(scene, ratios, map, 0.0, &mut self.sums);
         if moving {
             // Offsets and amplitudes of another place could seem to explain the effect of motion, so no pixel may
             // choose another place.
             self.refit(scene, ratios, params::MOVING_PHASE_TRUST, scratch.lend());
-            self.fit_phase(scene, ratios, scratch);
+            self.fit_phase(scene, ratios, false, scratch);
         } else {
             self.choose_places(scene, ratios);
-            for round in 0..params::TEXTURED_ROUNDS {
-                if !self.textured && round >= params::ROUNDS {
-                    break;
-                }
+            for _ in 0..params::ROUNDS {
                 self.refit(scene, ratios, params::PHASE_TRUST, scratch.lend());
-                if self.textured {
-                    self.choose_places(scene, ratios);
-                }
-                self.fit_phase(scene, ratios, scratch.lend());
+                self.choose_places(scene, ratios);
+                self.fit_phase(scene, ratios, true, scratch.lend());
             }
         }
         let map = PhaseMap { phase: &self.phase, modulation: &self.smooth_modulation };
@@ -195,12 +186,10 @@ impl CoarseLevel {
     }
 
     /// Step 6 on the coarse level: fits the phase with the present photometry, and computes squared residuals and
-    /// discontinuities.
-    fn fit_phase(&mut self, scene: &Scene<'_>, ratios: [f32; 4], scratch: Scratch<'_>) {
-        let mut window = Window::new(scene, &self.slopes, &self.modulation, self.noise).near();
-        if self.textured {
-            window = window.loosened(&self.residuals);
-        }
+    /// discontinuities. A `loosened` window needs the residuals of a refit.
+    fn fit_phase(&mut self, scene: &Scene<'_>, ratios: [f32; 4], loosened: bool, scratch: Scratch<'_>) {
+        let window = Window::new(scene, &self.slopes, &self.modulation, self.noise).near();
+        let window = if loosened { window.loosened(&self.residuals) } else { window };
         let squared_residual = self.work.chunks_exact_mut(scene.grid.stride).collect();
         let mut found = FitRows { squared_residual, ..FitRows::none(scene.grid.height) };
         let model = PhaseModel { scene, photometry: &self.photometry, ratios, window };
@@ -224,11 +213,9 @@ impl CoarseLevel {
         self.photometry.fit(scene, ratios, map, phase_trust, &mut self.sums);
     }
 
-    /// Step 5 on textured surfaces: each pixel takes offsets and amplitudes from the place that explains its intensities best. If
-    /// enough pixels take them from another place, the surface counts as textured.
+    /// Step 5: each pixel takes offsets and amplitudes from the place that explains its intensities best.
     fn choose_places(&mut self, scene: &Scene<'_>, ratios: [f32; 4]) {
         let map = PhaseMap { phase: &self.phase, modulation: &self.modulation };
-        let moved = self.photometry.choose_places(scene, ratios, map, self.noise);
-        self.textured = moved > params::TEXTURED_SHARE;
+        self.photometry.choose_places(scene, ratios, map, self.noise);
     }
 }

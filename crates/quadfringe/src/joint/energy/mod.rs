@@ -17,6 +17,7 @@ mod pixels;
 mod plane;
 mod preconditioner;
 mod priors;
+mod quadric;
 mod restart;
 mod scales;
 mod solve;
@@ -30,7 +31,7 @@ use super::scene::{Pixels, Scene};
 use crate::parallel::slots::Slots;
 use cells::{CellFit, Cells};
 use layout::Axis;
-use pixels::Surface;
+use pixels::{Surface, Surfaces};
 use plane::Plane;
 use rayon::prelude::*;
 use tile::{Found, Tile};
@@ -40,8 +41,7 @@ use tile::{Found, Tile};
 pub(super) struct Energy {
     cells: Cells,
     tiles: Vec<Found>,
-    /// Whether a cell and its neighbours lie on one surface.
-    smooth: Vec<bool>,
+    surfaces: Surfaces,
     slots: Slots<Tile>,
 }
 
@@ -63,7 +63,7 @@ impl Energy {
     pub fn minimise(&mut self, scene: &Scene<'_>, prior: Prior, pixels: &mut Pixels) {
         let factor = cell_px(scene.period_px);
         self.cells.average(scene, pixels.map(), factor);
-        let Self { cells, tiles, smooth, slots } = self;
+        let Self { cells, tiles, surfaces, slots } = self;
         let [rows, columns] = [cells.height, cells.width].map(Axis::new);
         let across = columns.origins.len();
         tiles.resize_with(rows.origins.len() * across, Found::default);
@@ -82,9 +82,9 @@ impl Energy {
         );
         let tiles = &*tiles;
         let shares = |y, x| shares(tiles, &rows, &columns, [y, x]);
-        cells.write_surface(scene, |y, x| surface(shares(y, x)), &mut pixels.phase, smooth);
+        surfaces.find(cells, |y, x| surface(shares(y, x)));
         cells.replace(|y, x| blend(shares(y, x)));
-        cells.correct(scene, smooth, pixels);
+        surfaces.write(scene, cells, pixels);
     }
 
     /// Albedo and contrast along row `y` of the scene.
@@ -101,7 +101,7 @@ impl Energy {
     /// Writes for each of the `width` pixels of row `y` whether the cells around it lie on one surface (J44).
     pub fn on_one_surface(&self, y: usize, width: usize, out: &mut Vec<bool>) {
         out.clear();
-        out.extend(self.cells.marks(&self.smooth, y).take(width));
+        out.extend(self.surfaces.marks(y).take(width));
     }
 
     /// Mean square of the correction of the last scene, rad^2.

@@ -21,20 +21,10 @@ pub const OTHER_TEXTURE: f32 = 0.015;
 /// test --test sizes`). Varied: no effect at x0.7; peaks without noise +2 % and near edges of dim steps -22 % at x1.4.
 pub const RIDGE: f32 = 1.7e-2;
 
-/// Number of rounds of photometry and phase after the first. More: time. With 1 a mosaic returns 0.3 per mille fewer of the pixels
-/// that full sampling returns; with none steps have 0.035 instead of 0.020 mm.
-/// `cargo test --test bayer a_mosaic_loses -- --nocapture`, `python evaluation/world.py --half tune --only steps`.
-pub const ROUNDS: usize = 2;
-/// Number of these rounds on textured surfaces. With 1 instead of 3 faces with patches have an RMS 7 % larger, with none 66 %.
-/// `python evaluation/world.py --half tune --only face_patches_20`. With 3 on all surfaces faces and steps gain nothing, but white
-/// shots take a sixth longer; with 2 on all, painted faces have +5 %.
-pub const TEXTURED_ROUNDS: usize = 3;
-
-/// A surface counts as textured if more than this share of its lit pixels takes offsets and amplitudes from another place.
-/// Smaller: white surfaces with many edges get the slower estimate for textured surfaces (varied x0.7: dim steps become
-/// textured, phase RMS -21 %, near edges +36 %). Larger: weak texture stays in the phase (x1.4: dim steps +6 %, near edges -19
-/// %).
-pub const TEXTURED_SHARE: f32 = 0.03;
+/// Number of rounds of photometry and phase after the first. More: time. With 2, twice as many pixels of rods have the wrong order; with
+/// 1, white fringes of 78 px have an RMS 10 % larger (`python evaluation/world.py --half tune --only rods fringes`). With 1 a mosaic
+/// returns 0.3 per mille fewer of the pixels that full sampling returns (`cargo test --test bayer a_mosaic_loses -- --nocapture`).
+pub const ROUNDS: usize = 3;
 
 /// Weight of the phase of the wide window relative to the information about the phase in the light. Larger: steps are smoothed.
 /// Smaller: errors of the photometry are explained as phase. Varied: no effect, but 4 % near edges of dim steps at x0.7. 0.01:

@@ -97,15 +97,9 @@ impl Photometry {
     }
 
     /// Lets every pixel choose among the offsets and amplitudes of the places around it, given the phase in `map` and intensities
-    /// with the standard deviation `noise`. Returns the share of the lit pixels that choose another place.
-    pub fn choose_places(
-        &mut self,
-        scene: &Scene<'_>,
-        ratios: [f32; 4],
-        map: PhaseMap<'_>,
-        noise: f32,
-    ) -> f32 {
-        self.choice.make(&self.maps, scene, ratios, [map.phase, map.modulation], noise)
+    /// with the standard deviation `noise`.
+    pub fn choose_places(&mut self, scene: &Scene<'_>, ratios: [f32; 4], map: PhaseMap<'_>, noise: f32) {
+        self.choice.make(&self.maps, scene, ratios, [map.phase, map.modulation], noise);
     }
 
     /// Offsets and amplitudes in one cell.

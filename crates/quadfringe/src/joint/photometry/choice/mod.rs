@@ -1,4 +1,4 @@
-//! Step 5 on textured surfaces: each pixel chooses a place to take offsets and amplitudes from. Near an edge of the texture, a
+//! Step 5: each pixel chooses a place to take offsets and amplitudes from. Near an edge of the texture, a
 //! window mixes two albedos; a window further away, on the same side of the edge as the pixel, does not. Where the light does not
 //! fit the offsets and amplitudes at the pixel, it takes offsets and amplitudes from a place nearby that explain the pixel and
 //! its neighbours best.
@@ -71,7 +71,7 @@ impl Choice {
     }
 
     /// Chooses a place for every pixel, by how well the intensities fit with the best albedo and, to first order, the best
-    /// phase. Returns the share of the lit pixels that take another place.
+    /// phase.
     pub fn make(
         &mut self,
         maps: &CellMaps,
@@ -79,7 +79,7 @@ impl Choice {
         ratios: [f32; 4],
         [phase, modulation]: [&[f32]; 2],
         noise: f32,
-    ) -> f32 {
+    ) {
         let (Self { places, stride, aside, slots }, grid) = (self, scene.grid);
         (*stride, *aside) =
             (grid.stride, (PLACE_DISTANCE * scene.period_px as f32).round().max(1.0) as usize);
@@ -116,8 +116,6 @@ impl Choice {
                 }
             },
         );
-        let chosen = count(places, |place| *place != 0);
-        chosen as f32 / count(modulation, |light| *light > 0.0).max(1) as f32
     }
 
     /// Replaces offsets and amplitudes of row `y` where its pixels have chosen another place. The grid lies over the scene of the
@@ -158,8 +156,4 @@ fn apply(
             }
         }
     }
-}
-
-fn count<T: Sync>(values: &[T], which: impl Fn(&T) -> bool + Sync) -> usize {
-    values.par_chunks(1 << 14).map(|values| values.iter().filter(|value| which(value)).count()).sum()
 }

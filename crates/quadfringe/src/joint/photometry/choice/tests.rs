@@ -6,7 +6,9 @@ use crate::joint::photometry::edge::{Edge, RATIOS};
 fn choose(edge: &Edge, noise: f32) -> (Choice, f32) {
     let (lit, modulation) = (edge.plane(1.0), edge.plane(0.2));
     let mut choice = Choice::default();
-    let share = choice.make(&edge.maps, &edge.scene(&lit), RATIOS, [&edge.phase, &modulation], noise);
+    choice.make(&edge.maps, &edge.scene(&lit), RATIOS, [&edge.phase, &modulation], noise);
+    let moved = choice.places.iter().filter(|place| **place != 0).count();
+    let share = moved as f32 / choice.places.len() as f32;
     (choice, share)
 }
 
