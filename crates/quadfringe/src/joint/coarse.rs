@@ -142,8 +142,6 @@ impl CoarseLevel {
                 self.fit_phase(scene, ratios, true, scratch.lend());
             }
         }
-        let map = PhaseMap { phase: &self.phase, modulation: &self.smooth_modulation };
-        self.slopes.refine(scene, map, &mut self.sums);
     }
 
     /// Step 6 on the coarse level: removes the shadows of the infrared projector of a pair.

@@ -2,7 +2,7 @@
 
 use super::cells::{CellMaps, CellWindow, RowMaps, TaskWork};
 use super::params::pyramid::SAMPLED_ROWS;
-use super::params::slopes::{FINE_WIDTH, WIDE_SHARE, WIDTH};
+use super::params::slopes::WIDTH;
 use super::scene::{PhaseMap, Scene};
 use crate::parallel::angle::wrap;
 use crate::parallel::lanes::{LANES, Lanes, lanes, take};
@@ -25,53 +25,22 @@ struct ShiftedRows {
 #[derive(Debug)]
 pub(super) struct Slopes {
     maps: CellMaps,
-    /// Slopes of the wide window, which are combined with the slopes of the fine window.
-    wide: CellMaps,
     slots: Slots<TaskWork<ShiftedRows>>,
-}
-
-/// A window of the fit.
-#[derive(Clone, Copy)]
-struct SlopeWindow {
-    /// In fringe periods.
-    width: f32,
-    /// Weight of the wide slopes, as a share of the pixels of a whole window.
-    wide_share: f32,
 }
 
 impl Default for Slopes {
     fn default() -> Self {
-        let [maps, wide] = [2, 2].map(CellMaps::new);
-        Self { maps, wide, slots: Slots::default() }
+        Self { maps: CellMaps::new(2), slots: Slots::default() }
     }
 }
 
 impl Slopes {
-    /// Measures the slopes of a phase in a wide window. The content of `sums` is lost.
+    /// Measures the slopes of a phase. The content of `sums` is lost.
     pub fn measure(&mut self, scene: &Scene<'_>, map: PhaseMap<'_>, sums: &mut CellMaps) {
-        self.average(scene, map, SlopeWindow { width: WIDTH, wide_share: 0.0 }, sums);
-    }
-
-    /// Measures the slopes of a phase without wrong orders in a smaller window. Where the window contains few pixels,
-    /// the slopes hardly change. The content of `sums` is lost.
-    pub fn refine(&mut self, scene: &Scene<'_>, map: PhaseMap<'_>, sums: &mut CellMaps) {
-        std::mem::swap(&mut self.maps, &mut self.wide);
-        self.average(scene, map, SlopeWindow { width: FINE_WIDTH, wide_share: WIDE_SHARE }, sums);
-    }
-
-    fn average(
-        &mut self,
-        scene: &Scene<'_>,
-        map: PhaseMap<'_>,
-        SlopeWindow { width, wide_share }: SlopeWindow,
-        sums: &mut CellMaps,
-    ) {
         let (PhaseMap { phase, modulation }, grid) = (map, scene.grid);
-        let Self { maps, wide, slots } = self;
-        let whole = (grid.step * SAMPLED_ROWS.min(grid.step)) as f32;
-        let wide_weight = wide_share * whole;
+        let Self { maps, slots } = self;
         grid.window_sums::<TERMS, ShiftedRows>(
-            CellWindow { sigma_cells: scene.cells(width), sampled_rows: SAMPLED_ROWS },
+            CellWindow { sigma_cells: scene.cells(WIDTH), sampled_rows: SAMPLED_ROWS },
             slots,
             sums,
             maps,
@@ -86,15 +55,12 @@ impl Slopes {
                 add_steps(here, [&right.phase, &right.modulation], [0, 1], sums);
                 add_steps(here, [scene.row(phase, below), scene.row(modulation, below)], [2, 3], sums);
             },
-            |row, [w, along, v, down], out| {
+            |_, [w, along, v, down], out| {
                 let (columns, step) = (w.len(), grid.step as f32);
-                let slope = |i: usize, sum: &[f32], weight: &[f32], map: usize| {
-                    let wide = if wide_weight > 0.0 { wide_weight * wide.line(row, map)[i] } else { 0.0 };
-                    (step * sum[i] + wide) / (weight[i] + wide_weight).max(1e-6)
-                };
+                let slope = |i: usize, sum: &[f32], weight: &[f32]| step * sum[i] / weight[i].max(1e-6);
                 for i in 0..columns {
-                    out[i] = slope(i, along, w, 0);
-                    out[columns + i] = slope(i, down, v, 1);
+                    out[i] = slope(i, along, w);
+                    out[columns + i] = slope(i, down, v);
                 }
             },
         );
@@ -164,35 +130,5 @@ mod tests {
             assert!((along - 1.0).abs() < 1e-3 && (down + 0.4).abs() < 1e-3, "{column}: {along} {down}");
         }
         assert_eq!(slopes.at(12, 60), [0.0, 0.0]);
-    }
-
-    #[test]
-    fn refined_slopes_follow_the_surface_and_stay_where_little_is_seen() {
-        let grid = Grid::new([96, 256], 4.0);
-        let wave = std::f32::consts::TAU / 50.0;
-        let phase: Vec<f32> = (0..grid.pixels())
-            .map(|i| {
-                let x = (i % 256) as f32;
-                0.25 * x + (wave * x).sin()
-            })
-            .collect();
-        // Beyond column 160 the surface is not lit. Only the wide window reaches across this border.
-        let lit: Vec<f32> = (0..grid.pixels()).map(|i| f32::from(u8::from(i % 256 < 160))).collect();
-        let light = vec![0.5; grid.pixels()];
-        let scene =
-            Scene { light: [&light; 4], usable: &light, grid: &grid, period_px: 25.0, factor: 1, pair: None };
-        let mut slopes = Slopes::default();
-        slopes.measure(&scene, PhaseMap { phase: &phase, modulation: &lit }, &mut CellMaps::default());
-        let (before, beyond) = (slopes.maps.line(12, 0).to_vec(), slopes.at(12, 44));
-        slopes.refine(&scene, PhaseMap { phase: &phase, modulation: &lit }, &mut CellMaps::default());
-        let after = slopes.maps.line(12, 0);
-        let truth = |column: usize| 4.0 * (0.25 + wave * (wave * (4.0 * column as f32 + 2.0)).cos());
-        let worst =
-            |line: &[f32]| (8..32).map(|column| (line[column] - truth(column)).abs()).fold(0.0, f32::max);
-        assert!(worst(after) < 0.45 * worst(&before), "{} {}", worst(after), worst(&before));
-        for k in 0..2 {
-            assert!((slopes.at(12, 44)[k] - beyond[k]).abs() < 0.02, "{:?} {beyond:?}", slopes.at(12, 44));
-        }
-        assert!(beyond[0] > 0.5, "{beyond:?}");
     }
 }
