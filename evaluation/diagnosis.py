@@ -1,14 +1,16 @@
 """Measure how often the doctor names the cause of a planted fault first, and how often it finds fault with sound shots.
 
-    python evaluation/diagnosis.py [--seed 2] [--only CAUSE ...] [--without-calibration] [--figures] [--json FILE]
+    python evaluation/diagnosis.py [--seed 7] [--only CAUSE ...] [--without-calibration] [--figures] [--json FILE]
 
 Thirty shots of the virtual bench, 1024 x 768, have one fault each: ten causes of three strengths. Thirty shots have
 none. The first finding that is not good counts. The numbers of the tests were chosen on seeds 1 to 4; report others.
+With all causes and the calibration, the counts are held against their bars; the exit status is 1 when one is missed.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
 from itertools import chain
 from pathlib import Path
 
@@ -17,6 +19,7 @@ from quadfringe.decoding import detail
 from quadfringe.decoding.closures import closure_of
 from quadfringe.doctor import Finding, examine_shot
 from quadfringe.evaluation import broken
+from quadfringe.evaluation._ledger import bars
 from quadfringe.files import figures_text
 
 
@@ -35,7 +38,7 @@ def named(case: broken.Case, plan: qf.Plan) -> tuple[bool, str]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--seed", type=int, default=2)
+    parser.add_argument("--seed", type=int, default=7)
     parser.add_argument("--only", nargs="*", metavar="CAUSE", help="causes to plant; without a name, none")
     parser.add_argument("--without-calibration", action="store_true")
     parser.add_argument("--figures", action="store_true", help="print the figures that the tests limit")
@@ -55,8 +58,17 @@ def main() -> None:
         if options.figures:
             print(f"      {closure_of(case.shot, plan)}, sharpness {detail.sharpness(case.shot):.2f}")
     print(f"{right} of {3 * len(causes)} causes are named first, {alarms} false alarms on sound shots")
+    figures = {"causes_named_first": float(right), "false_alarms": float(alarms)}
     if options.json:
-        options.json.write_text(figures_text({"causes_named_first": right, "false_alarms": alarms}))
+        options.json.write_text(figures_text(figures))
+    limits = {name: bars()[f"diagnosis.{name}"] for name in figures}
+    missed = [
+        f"missed: {name} {figures[name]:g}, bar {bar.text}"
+        for name, bar in limits.items()
+        if not bar.holds(figures[name])
+    ]
+    if missed and options.only is None and not options.without_calibration:
+        sys.exit("\n".join(missed))
 
 
 if __name__ == "__main__":

@@ -63,5 +63,6 @@ def test_wide_fringes_and_not_the_calibration_bend_a_small_sphere() -> None:
             sphere = accept(Artefacts(spheres=(xyz_mm_of(scanner.measure()),), sphere_diameter_mm=SPHERE_DIAMETER_MM))
         found[name] = sphere.figures["sphere_1_form_6sigma_mm"]
     print(f"6 sigma form of a sphere, mm: {found}")
+    hold("rgb.half_size_form_mm", found["rgb"])
     hold("rgb.half_size_form_ratio", found["rgb"] / found["16"])
     hold("rgb.half_size_form_over_36", found["rgb"] / found["36"])

@@ -1,6 +1,6 @@
 //! From the cells back to the pixels. Every pixel takes the phase of the surface through the cells around it: detail of the start that is
 //! finer than a cell is noise, or texture that the windows of the start have mixed (J44). Near discontinuities its phase at the start
-//! only tells which of these surfaces is its own (J45).
+//! only tells on which of these surfaces it lies (J45).
 
 use super::cells::{Cells, Rows};
 use super::quadric::{Patch, Quadric, from_middle, is_one_surface};
@@ -20,67 +20,79 @@ pub(super) struct Surface {
     pub bend: f32,
 }
 
-/// The surfaces through the cells of a shot.
+/// The fitted surface of a shot, by cells.
 #[derive(Debug, Default)]
 pub(super) struct Surfaces {
     /// Pixels along a side of a cell.
     side: usize,
     height: usize,
     width: usize,
-    cells: Vec<CellSurface>,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct CellSurface {
-    quadric: Quadric,
-    /// Whether the cells around lie on it, too.
-    smooth: bool,
-}
-
-/// Rows of cells.
-#[derive(Debug, Default)]
-struct Lines {
-    /// Fitted phase above, at and below a row, rad; not a number outside the cells of the fit.
-    fitted: [Vec<f32>; 3],
-    /// Variance of the second differences in the row, rad^2.
+    /// Fitted phase, rad; not a number outside the cells of the fit.
+    fitted: Vec<f32>,
+    /// Variance of the second differences of the phase, rad^2.
     bend: Vec<f32>,
+    /// Whether a cell and those around lie on one surface.
+    smooth: Vec<bool>,
 }
+
+/// The surfaces that meet in a cell: through the cells around, row by row, and through the cell.
+type Meeting = [Quadric; 9];
 
 impl Surfaces {
-    /// Finds the surface through every cell. `fit` gives what the fit has found for a cell.
+    /// Takes the fitted phases. `fit` gives what the fit has found for a cell.
     pub fn find(&mut self, cells: &Cells, fit: impl Fn(usize, usize) -> Option<Surface> + Sync) {
-        let Self { side, height, width, cells: surfaces } = self;
-        (*side, *height, *width) = (cells.factor, cells.height, cells.width);
-        surfaces.clear();
-        surfaces.resize(*height * *width, CellSurface { quadric: Quadric::NONE, smooth: false });
-        surfaces.par_chunks_mut((*width).max(1)).enumerate().for_each_init(
-            Lines::default,
-            |lines, (row, surfaces)| {
-                lines.load(cells, row, &fit);
-                for (x, surface) in surfaces.iter_mut().enumerate() {
-                    *surface = lines.surface(x);
-                }
-            },
-        );
+        (self.side, self.height, self.width) = (cells.factor, cells.height, cells.width);
+        let (size, width) = (self.height * self.width, self.width.max(1));
+        for plane in [&mut self.fitted, &mut self.bend] {
+            plane.clear();
+            plane.resize(size, 0.0);
+        }
+        let rows = self.fitted.par_chunks_mut(width).zip(self.bend.par_chunks_mut(width)).enumerate();
+        rows.for_each(|(y, (fitted, bend))| {
+            for (x, (fitted, bend)) in fitted.iter_mut().zip(bend).enumerate() {
+                let found = fit(y, x);
+                *fitted = found.as_ref().map_or(f32::NAN, |fit| cells.start(y, x) + fit.correction);
+                *bend = found.map_or(0.0, |fit| fit.bend);
+            }
+        });
+        self.mark();
+    }
+
+    /// Marks the cells on one surface.
+    fn mark(&mut self) {
+        let mut smooth = std::mem::take(&mut self.smooth);
+        smooth.clear();
+        smooth.resize(self.fitted.len(), false);
+        smooth.par_chunks_mut(self.width.max(1)).enumerate().for_each(|(y, smooth)| {
+            for (x, smooth) in smooth.iter_mut().enumerate() {
+                *smooth = is_one_surface(&self.patch([y, x]), self.bend[y * self.width + x]);
+            }
+        });
+        self.smooth = smooth;
     }
 
     /// Whether the pixels of row `y` lie among cells of one surface.
     pub fn marks(&self, y: usize) -> impl Iterator<Item = bool> {
         let row = y / self.side.max(1) * self.width;
-        let cells = self.cells.get(row..row + self.width).unwrap_or_default();
-        cells.iter().flat_map(|cell| repeat_n(cell.smooth, self.side)).chain(repeat(false))
+        let cells = self.smooth.get(row..row + self.width).unwrap_or_default();
+        cells.iter().flat_map(|smooth| repeat_n(*smooth, self.side)).chain(repeat(false))
     }
 
-    /// Gives the pixels the phase of their surface. Those without any, and dark ones, are moved as the cells around are. Where `cells` move them too
-    /// far, the modulation becomes 0.
+    /// Gives the pixels the phase of their surface. Those without any, and dark ones, are moved as the cells around are. Where `cells`
+    /// move them too far, the modulation becomes 0.
     pub fn write(&self, scene: &Scene<'_>, cells: &Cells, pixels: &mut Pixels) {
         let stride = scene.grid.stride;
+        let band = self.side.max(1) * stride;
         let Pixels { phase, modulation, reasons } = pixels;
-        let planes = phase.par_chunks_mut(stride).zip(modulation.par_chunks_mut(stride));
-        let rows = planes.zip(reasons.par_chunks_mut(stride)).enumerate();
-        rows.for_each_init(Rows::default, |rows, (y, ((phase, modulation), reasons))| {
-            let corrections = cells.corrections(scene, y, rows);
-            self.write_row(y, corrections, phase, modulation);
+        let planes = phase.par_chunks_mut(band).zip(modulation.par_chunks_mut(band));
+        let bands = planes.zip(reasons.par_chunks_mut(band)).enumerate();
+        bands.for_each_init(Work::default, |work, (row, ((phase, modulation), reasons))| {
+            let Work { rows, corrections } = work;
+            corrections.clear();
+            for i in 0..phase.len() / stride {
+                corrections.extend_from_slice(&cells.corrections(scene, row * self.side + i, rows)[..stride]);
+            }
+            self.write_band(row, stride, corrections, phase, modulation);
             for ((modulation, reason), correction) in modulation.iter_mut().zip(reasons).zip(corrections) {
                 if correction.abs() > MOVED_MAX_RAD && *modulation > 0.0 {
                     *modulation = 0.0;
@@ -90,101 +102,112 @@ impl Surfaces {
         });
     }
 
-    fn write_row(&self, y: usize, corrections: &[f32], phase: &mut [f32], modulation: &[f32]) {
-        let (row, side) = (y / self.side, self.side);
-        let down = (y % side) as f32;
-        let inside = if row < self.height { self.width * side } else { 0 };
-        for (column, pixels) in phase[..inside].chunks_exact_mut(side).enumerate() {
-            let CellSurface { quadric, smooth } = self.cells[row * self.width + column];
-            for (x, phase) in pixels.iter_mut().enumerate() {
-                let (at, place) = (column * side + x, [x as f32, down]);
-                *phase = if smooth {
-                    quadric.at(place, side as f32)
-                } else {
-                    let lit = Some(*phase).filter(|_| modulation[at] > 0.0);
-                    let nearest = lit.and_then(|start| self.nearest([row, column], place, start));
-                    nearest.unwrap_or(*phase + corrections[at])
-                };
-            }
-        }
-        let aside = phase[inside..].iter_mut().zip(&corrections[inside..]);
-        aside.for_each(|(phase, correction)| *phase += correction);
-    }
-
-    /// The phase at a pixel of a cell on the one of the surfaces around that explains its phase at the `start` best; none if that is far
-    /// from all of them. A surface is known the better the nearer its cell is: differences count by the square of this distance.
-    fn nearest(&self, [row, column]: [usize; 2], [x, y]: [f32; 2], start: f32) -> Option<f32> {
+    /// Writes the pixels of a row of cells.
+    fn write_band(
+        &self,
+        row: usize,
+        stride: usize,
+        corrections: &[f32],
+        phase: &mut [f32],
+        modulation: &[f32],
+    ) {
         let side = self.side as f32;
-        let (mut least, mut best) = (f32::INFINITY, None);
-        for near_row in row.saturating_sub(1)..(row + 2).min(self.height) {
-            for near_column in column.saturating_sub(1)..(column + 2).min(self.width) {
-                let pixel = [
-                    x + (column as f32 - near_column as f32) * side,
-                    y + (row as f32 - near_row as f32) * side,
-                ];
-                let phase = self.cells[near_row * self.width + near_column].quadric.at(pixel, side);
-                let apart = (phase - start).abs();
-                let square: f32 = from_middle(pixel, side).map(|distance| distance * distance).iter().sum();
-                if apart < SAME_SURFACE_RAD && apart * square < least {
-                    (least, best) = (apart * square, Some(phase));
+        for (y, phase) in phase.chunks_mut(stride).enumerate() {
+            let inside = if row < self.height { self.width * self.side } else { 0 };
+            let aside = phase[inside..].iter_mut().zip(&corrections[y * stride..][inside..]);
+            aside.for_each(|(phase, correction)| *phase += correction);
+        }
+        let columns = if row < self.height { 0..self.width } else { 0..0 };
+        for column in columns {
+            let smooth = self.smooth[row * self.width + column];
+            let own = if smooth { Quadric::through(&self.patch([row, column])) } else { Quadric::NONE };
+            let meeting = (!smooth).then(|| self.meeting([row, column]));
+            for (y, phase) in phase.chunks_mut(stride).enumerate() {
+                for x in 0..self.side {
+                    let (at, place) = (column * self.side + x, [x as f32, y as f32]);
+                    let lit = modulation[y * stride + at] > 0.0;
+                    phase[at] = match &meeting {
+                        None => own.at(place, side),
+                        Some(meeting) => nearest(meeting, place, side, phase[at])
+                            .filter(|_| lit)
+                            .unwrap_or(phase[at] + corrections[y * stride + at]),
+                    };
                 }
             }
         }
-        best
+    }
+
+    /// Fitted phases of a cell and those around.
+    fn patch(&self, [row, column]: [usize; 2]) -> Patch {
+        let value = |dy: usize, dx: usize| {
+            let (y, x) = ((row + dy).wrapping_sub(1), (column + dx).wrapping_sub(1));
+            if y < self.height && x < self.width { self.fitted[y * self.width + x] } else { f32::NAN }
+        };
+        std::array::from_fn(|dy| std::array::from_fn(|dx| value(dy, dx)))
+    }
+
+    fn meeting(&self, [row, column]: [usize; 2]) -> Meeting {
+        std::array::from_fn(|n| {
+            let at = [(row + n / 3).wrapping_sub(1), (column + n % 3).wrapping_sub(1)];
+            if at[0] >= self.height || at[1] >= self.width {
+                return Quadric::NONE;
+            }
+            let (patch, index) = (self.patch(at), at[0] * self.width + at[1]);
+            if self.smooth[index] {
+                Quadric::through(&patch)
+            } else {
+                Quadric::beside_discontinuity(&patch, self.bend[index])
+            }
+        })
     }
 }
 
-impl Lines {
-    /// Loads the lines around a row of cells.
-    fn load(&mut self, cells: &Cells, row: usize, fit: &impl Fn(usize, usize) -> Option<Surface>) {
-        let Self { fitted, bend } = self;
-        bend.clear();
-        for (k, fitted) in fitted.iter_mut().enumerate() {
-            fitted.clear();
-            let y = (row + k).checked_sub(1).filter(|&y| y < cells.height);
-            for x in 0..cells.width {
-                let found = y.and_then(|y| Some((cells.start(y, x), fit(y, x)?)));
-                fitted.push(found.as_ref().map_or(f32::NAN, |(start, fit)| start + fit.correction));
-                if k == 1 {
-                    bend.push(found.map_or(0.0, |(_, fit)| fit.bend));
-                }
-            }
+/// Working memory of a band.
+#[derive(Debug, Default)]
+struct Work {
+    rows: Rows,
+    corrections: Vec<f32>,
+}
+
+/// The phase at a pixel of a cell on the one of the surfaces that explains its phase at the `start` best; none if that is far from all
+/// of them. A surface is known the better the nearer its cell is: differences count by the square of this distance.
+fn nearest(meeting: &Meeting, [x, y]: [f32; 2], side: f32, start: f32) -> Option<f32> {
+    let (mut least, mut best) = (f32::INFINITY, None);
+    for (n, surface) in meeting.iter().enumerate() {
+        let pixel = [x - ((n % 3) as f32 - 1.0) * side, y - ((n / 3) as f32 - 1.0) * side];
+        let phase = surface.at(pixel, side);
+        let apart = (phase - start).abs();
+        let square: f32 = from_middle(pixel, side).map(|distance| distance * distance).iter().sum();
+        if apart < SAME_SURFACE_RAD && apart * square < least {
+            (least, best) = (apart * square, Some(phase));
         }
     }
-
-    /// The surface through the cell in column `x`.
-    fn surface(&self, x: usize) -> CellSurface {
-        let value = |line: &Vec<f32>, k: usize| {
-            (x + k).checked_sub(1).and_then(|x| line.get(x).copied()).unwrap_or(f32::NAN)
-        };
-        let patch: Patch = self.fitted.each_ref().map(|line| [0, 1, 2].map(|k| value(line, k)));
-        let bend = self.bend[x];
-        let smooth = is_one_surface(&patch, bend);
-        let quadric =
-            if smooth { Quadric::through(&patch) } else { Quadric::beside_discontinuity(&patch, bend) };
-        CellSurface { quadric, smooth }
-    }
+    best
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Lines of eight cells of a slope with a step, or with a hole.
-    fn lines(change: f32) -> Lines {
-        let line = || (0..8).map(|x| 0.6 * x as f32 + if x > 4 { change } else { 0.0 }).collect();
-        Lines { fitted: [line(), line(), line()], bend: vec![1e-4; 8] }
+    /// Three rows of eight cells of a slope with a step, or with a hole.
+    fn surfaces(change: f32) -> Surfaces {
+        let fitted = (0..24).map(|i| 0.6 * (i % 8) as f32 + if i % 8 > 4 { change } else { 0.0 }).collect();
+        let mut surfaces =
+            Surfaces { side: 4, height: 3, width: 8, fitted, bend: vec![1e-4; 24], smooth: Vec::new() };
+        surfaces.mark();
+        surfaces
     }
 
-    fn surfaces(change: f32) -> Surfaces {
-        let lines = lines(change);
-        let cells = (0..8).map(|x| lines.surface(x)).collect();
-        Surfaces { side: 4, height: 1, width: 8, cells }
+    /// The phases of a row of pixels after that of cells in the middle is written.
+    fn written(surfaces: &Surfaces, start: &[f32], correction: f32) -> Vec<f32> {
+        let mut phase = start.repeat(4);
+        surfaces.write_band(1, 32, &[correction; 128], &mut phase, &[1.0; 128]);
+        phase[32..64].to_vec()
     }
 
     #[test]
     fn a_step_or_a_missing_cell_ends_the_surface() {
-        let smooth = |change: f32| -> Vec<bool> { surfaces(change).marks(2).step_by(4).take(8).collect() };
+        let smooth = |change: f32| -> Vec<bool> { surfaces(change).marks(6).step_by(4).take(8).collect() };
         assert_eq!(smooth(0.0), [false, true, true, true, true, true, true, false]);
         assert_eq!(smooth(0.3), [false, true, true, true, false, false, true, false]);
         assert_eq!(smooth(f32::NAN), [false, true, true, true, false, false, false, false]);
@@ -195,9 +218,9 @@ mod tests {
         let surfaces = surfaces(2.0);
         let slope = |x: usize| 0.6 * ((x as f32 + 0.5) / 4.0 - 0.5);
         let mut phase: Vec<f32> = (0..32).map(|x| slope(x) + if x > 18 { 2.0 } else { 0.0 } + 0.1).collect();
-        phase[17] += 1.5;
+        phase[17] += 1.8;
         let truth: Vec<f32> = (0..32).map(|x| slope(x) + if x > 18 { 2.0 } else { 0.0 }).collect();
-        surfaces.write_row(1, &[0.0; 32], &mut phase, &[1.0; 32]);
+        let phase = written(&surfaces, &phase, 0.0);
         for x in (0..32).filter(|x| *x != 17) {
             assert!((phase[x] - truth[x]).abs() < 1e-4, "{x}: {} {}", phase[x], truth[x]);
         }
@@ -207,8 +230,6 @@ mod tests {
 
     #[test]
     fn a_pixel_far_from_all_surfaces_is_moved_as_its_cells_are() {
-        let mut phase = vec![9.0; 32];
-        surfaces(f32::NAN).write_row(1, &[0.05; 32], &mut phase, &[1.0; 32]);
-        assert_eq!(phase[21], 9.05);
+        assert_eq!(written(&surfaces(f32::NAN), &[9.0; 32], 0.05)[21], 9.05);
     }
 }
