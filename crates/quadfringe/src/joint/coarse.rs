@@ -135,9 +135,10 @@ impl CoarseLevel {
             self.refit(scene, ratios, params::MOVING_PHASE_TRUST, scratch.lend());
             self.fit_phase(scene, ratios, false, scratch);
         } else {
+            self.choose_places(scene, ratios);
             for _ in 0..params::ROUNDS {
-                self.choose_places(scene, ratios);
                 self.refit(scene, ratios, params::PHASE_TRUST, scratch.lend());
+                self.choose_places(scene, ratios);
                 self.fit_phase(scene, ratios, true, scratch.lend());
             }
         }
