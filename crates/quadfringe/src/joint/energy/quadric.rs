@@ -51,7 +51,7 @@ impl Quadric {
         if slope.iter().any(|slope| slope.is_nan()) {
             return Self::NONE;
         }
-        Self { mean: patch[1][1], slope, ..Self { mean: 0.0, ..Self::NONE } }
+        Self { mean: patch[1][1], slope, ..Self::NONE }
     }
 
     /// Its value at pixel `[x, y]` from the first one of a cell with this many pixels along a side.
