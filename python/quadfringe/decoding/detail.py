@@ -31,10 +31,10 @@ def steepness(shot: AnyShot) -> float:
 
     found = []
     for image in shot.channels.values():
-        fine, near = (np.abs(_between(image, *sigmas)) for sigmas in ((1.5, 3.0), (3.0, 6.0)))
-        near = cv2.dilate(near, np.ones((13, 13), np.uint8))
+        detail, near = (_between(image, *sigmas) for sigmas in ((1.5, 3.0), (3.0, 6.0)))
+        fine, near = np.abs(detail), cv2.dilate(np.abs(near), np.ones((13, 13), np.uint8))
         strongest = fine >= np.quantile(fine, 0.995)
-        power = float(np.mean(fine[strongest] ** 2)) - _noise(_between(image, 1.5, 3.0)) ** 2
+        power = float(np.mean(fine[strongest] ** 2)) - _noise(detail) ** 2
         found.append(np.sqrt(max(power, 0.0) / max(float(np.mean(near[strongest] ** 2)), 1e-9)))
     return float(np.median(found))
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.data import Shot
+from quadfringe.decoding.closures import in_squares
 
 __all__ = ["Highlight", "fullest_tile", "overexposed", "saturated_share"]
 
@@ -55,6 +56,4 @@ def fullest_tile(shot: Shot, side_px: int = 32) -> float:
     images = list(shot.channels.values())
     count = np.sum([image == 255 for image in images], axis=0)
     cut = (count > 0) & (len(images) - count >= 2)
-    rows, columns = (size // side_px for size in cut.shape)
-    tiles = cut[: rows * side_px, : columns * side_px].reshape(rows, side_px, columns, side_px)
-    return float(tiles.mean(axis=(1, 3)).max())
+    return float(in_squares(cut, side_px).mean(axis=1).max())

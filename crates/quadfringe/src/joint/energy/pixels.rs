@@ -117,22 +117,26 @@ impl Surfaces {
             let aside = phase[inside..].iter_mut().zip(&corrections[y * stride..][inside..]);
             aside.for_each(|(phase, correction)| *phase += correction);
         }
-        let columns = if row < self.height { 0..self.width } else { 0..0 };
-        for column in columns {
-            let smooth = self.smooth[row * self.width + column];
-            let own = if smooth { Quadric::through(&self.patch([row, column])) } else { Quadric::NONE };
-            let meeting = (!smooth).then(|| self.meeting([row, column]));
-            for (y, phase) in phase.chunks_mut(stride).enumerate() {
-                for x in 0..self.side {
-                    let (at, place) = (column * self.side + x, [x as f32, y as f32]);
-                    let lit = modulation[y * stride + at] > 0.0;
-                    phase[at] = match &meeting {
-                        None => own.at(place, side),
-                        Some(meeting) => nearest(meeting, place, side, phase[at])
-                            .filter(|_| lit)
-                            .unwrap_or(phase[at] + corrections[y * stride + at]),
-                    };
-                }
+        if row >= self.height {
+            return;
+        }
+        for column in 0..self.width {
+            let rows = phase.len() / stride;
+            let pixels = || {
+                let places = (0..rows).flat_map(|y| (0..self.side).map(move |x| [x, y]));
+                places.map(|[x, y]| (y * stride + column * self.side + x, [x as f32, y as f32]))
+            };
+            if self.smooth[row * self.width + column] {
+                let surface = Quadric::through(&self.patch([row, column]));
+                pixels().for_each(|(at, place)| phase[at] = surface.at(place, side));
+                continue;
+            }
+            // Most cells without one surface are dark.
+            let meeting = pixels().any(|(at, _)| modulation[at] > 0.0).then(|| self.meeting([row, column]));
+            for (at, place) in pixels() {
+                let lit = meeting.as_ref().filter(|_| modulation[at] > 0.0);
+                let found = lit.and_then(|meeting| nearest(meeting, place, side, phase[at]));
+                phase[at] = found.unwrap_or(phase[at] + corrections[at]);
             }
         }
     }
