@@ -69,7 +69,7 @@ use infrared::PairPhase;
 use light::{Marks, fringe_period_px, linear_light};
 use memory::OutputMemory;
 use motion::{Motion, Timing};
-use noise::least_modulation;
+use noise::{least_modulation, noise_of_difference};
 use params::pyramid::{CELLS_PER_PERIOD, FACTOR_MAX};
 use pyramid::{Pyramid, Upsampler};
 use regions::RegionOrders;
@@ -181,15 +181,18 @@ impl Joint {
 
     /// Step 6: the minimum of the energy, with this `detail`.
     fn minimise(&mut self, frame: &Frame<'_>, detail: f32) {
-        let prior = Prior { ratios: self.ratios, noise: self.coarse.noise, detail };
         let scene = self.pyramid.full.scene(frame.full);
+        let [red, _, blue, _] = scene.light;
+        // Fine texture of a cloth is no noise: the albedo of a cell takes it up.
+        let noise = self.coarse.noise.min(noise_of_difference([red, blue], scene.grid));
+        let prior = Prior { ratios: self.ratios, noise, detail };
         self.energy.minimise(&scene, prior, &mut self.pixels);
         let Pixels { phase, modulation, .. } = &mut self.pixels;
         // 8. Orders of regions, by the phase of the energy.
         let energy = &self.energy;
         let brightness =
             |y: usize, work: &mut energy::Rows, out: &mut Vec<f32>| energy.brightness(&scene, y, work, out);
-        self.regions.settle(&scene, prior.noise, &brightness, modulation, phase);
+        self.regions.settle(&scene, self.coarse.noise, &brightness, modulation, phase);
     }
 
     /// Step 8: the mask of valid pixels, and the quality of the order of every lit pixel.

@@ -15,7 +15,14 @@ const MEDIAN_OF_NORMAL: f32 = 0.6745;
 /// Noise of a plane of light, from a mask that gives 0 for every variation that is only along rows or only along
 /// columns (Immerkaer, Comput. Vis. Image Underst. 64, 300 (1996)); in the unit of the light.
 pub(super) fn noise_of_image(red: &[f32], grid: &Grid) -> f32 {
-    deviation(bends(red, grid, NOISE_SAMPLES).map(|seen| seen.bend).collect())
+    deviation(bends(|at| red[at], grid, NOISE_SAMPLES).map(|seen| seen.bend).collect())
+}
+
+/// Noise of a pixel from the difference of two channels, in which texture finer than the mask cancels as far as both share it; in the
+/// unit of the light.
+pub(super) fn noise_of_difference([one, other]: [&[f32]; 2], grid: &Grid) -> f32 {
+    let bends = bends(|at| one[at] - other[at], grid, NOISE_SAMPLES);
+    deviation(bends.map(|seen| seen.bend).collect()) / std::f32::consts::SQRT_2
 }
 
 /// Least modulation that counts as light in a shot with this red image.
@@ -70,7 +77,7 @@ impl NoiseByLight {
 impl Curve {
     /// The noise of groups of pixels of similar light, interpolated.
     fn of(plane: &[f32], grid: &Grid, whole: f32) -> Self {
-        let mut seen: Vec<Seen> = bends(plane, grid, NOISE_SAMPLES / 4).collect();
+        let mut seen: Vec<Seen> = bends(|at| plane[at], grid, NOISE_SAMPLES / 4).collect();
         if seen.len() < NOISE_GROUPS || whole <= 0.0 {
             return Self::default();
         }
@@ -107,16 +114,20 @@ struct Seen {
     bend: f32,
 }
 
-/// What is seen around `samples` to twice as many pixels of a plane.
-fn bends<'a>(plane: &'a [f32], grid: &'a Grid, samples: usize) -> impl Iterator<Item = Seen> + 'a {
-    let stride = grid.stride;
+/// What is seen around `samples` to twice as many pixels of a plane, whose `light` is given by the place.
+fn bends<'a>(
+    light: impl Fn(usize) -> f32 + 'a,
+    grid: &'a Grid,
+    samples: usize,
+) -> impl Iterator<Item = Seen> + 'a {
+    let (stride, len) = (grid.stride, grid.stride * grid.height);
     // Rows are padded to whole vectors, so an odd step visits all columns.
-    let step = (plane.len() / samples) | 1;
-    (stride + 1..plane.len().saturating_sub(stride + 1))
+    let step = (len / samples) | 1;
+    (stride + 1..len.saturating_sub(stride + 1))
         .step_by(step)
         .filter(move |i| i % stride + 1 < grid.width)
         .map(move |i| {
-            let rows = [i - stride, i, i + stride].map(|at| [plane[at - 1], plane[at], plane[at + 1]]);
+            let rows = [i - stride, i, i + stride].map(|at| [light(at - 1), light(at), light(at + 1)]);
             let [above, here, below] = rows.map(|[left, middle, right]| left - 2.0 * middle + right);
             let light = rows.iter().flatten().sum::<f32>() / 9.0;
             Seen { light, bend: (above - 2.0 * here + below).abs() }

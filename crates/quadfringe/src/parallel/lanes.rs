@@ -39,3 +39,33 @@ pub(crate) fn add<const N: usize>(sums: &mut [Lanes; N], terms: &[Lanes; N]) {
         *sum += term;
     }
 }
+
+/// `value - factor * by` in every lane.
+#[inline(always)]
+pub(crate) fn less(value: Lanes, factor: Lanes, by: Lanes) -> Lanes {
+    let mut out = [0.0; LANES];
+    for x in 0..LANES {
+        out[x] = value[x] - factor[x] * by[x];
+    }
+    out
+}
+
+/// `value + factor * by` in every lane.
+#[inline(always)]
+pub(crate) fn plus(value: Lanes, factor: Lanes, by: Lanes) -> Lanes {
+    let mut out = [0.0; LANES];
+    for x in 0..LANES {
+        out[x] = value[x] + factor[x] * by[x];
+    }
+    out
+}
+
+/// Product in every lane.
+#[inline(always)]
+pub(crate) fn times(value: Lanes, factor: Lanes) -> Lanes {
+    let mut out = [0.0; LANES];
+    for x in 0..LANES {
+        out[x] = value[x] * factor[x];
+    }
+    out
+}

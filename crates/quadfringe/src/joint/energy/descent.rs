@@ -5,7 +5,7 @@ use super::data::linearise;
 use super::plane::{Column, vectors};
 use super::priors::weigh;
 use super::scales::{Determined, Scales};
-use super::solve::{Effort, solve};
+use super::solve::solve;
 use super::start::contrast_and_albedo;
 use super::tile::{Found, Tile};
 use super::variance::variance;
@@ -37,7 +37,7 @@ impl Tile {
         self.unknown.phase.copy(&self.start);
         self.spread.clear();
         contrast_and_albedo(self, 1.0);
-        self.descend(noise, self.scales.bend, OUTER_STEPS, Effort::usual());
+        self.descend(noise, self.scales.bend, OUTER_STEPS);
         self.restart(noise);
         let sums = linearise(self);
         self.scales.estimate_noise(&sums, self.ratios, noise..=f32::INFINITY);
@@ -53,7 +53,7 @@ impl Tile {
         self.scales.bend *= detail.powi(4);
         for _ in 0..DETAIL_STEPS {
             weigh(self);
-            solve(self, Effort::usual());
+            solve(self);
             self.advance();
             linearise(self);
         }
@@ -61,9 +61,8 @@ impl Tile {
 
     /// Lowers the energy from the present unknowns, and estimates the scales. `noise` is the least variance of the noise, and `bend_max`
     /// the greatest variance of the bending in the first step; it grows from step to step (J43). While it limits the surface, the noise
-    /// may not rise, or it would explain what the surface may not, and each step takes this `effort`. At most `steps` follow in which it does
-    /// not.
-    pub(super) fn descend(&mut self, noise: f32, mut bend_max: f32, steps: usize, effort: Effort) {
+    /// may not rise, or it would explain what the surface may not. At most `steps` follow in which it does not.
+    pub(super) fn descend(&mut self, noise: f32, mut bend_max: f32, steps: usize) {
         self.scales.determined = Determined::default();
         let (mut outer, mut free, mut limited) = (0, 0, false);
         while free < steps {
@@ -79,7 +78,7 @@ impl Tile {
                 weigh(self);
             }
             limited = self.scales.bend >= bend_max;
-            solve(self, if limited { effort } else { Effort::usual() });
+            solve(self);
             let moved = self.advance();
             debug_assert!(moved.is_finite(), "a step of a tile is not finite");
             free += usize::from(!limited);

@@ -21,6 +21,7 @@ mod quadric;
 mod restart;
 mod scales;
 mod solve;
+mod splines;
 mod start;
 mod tile;
 mod value;

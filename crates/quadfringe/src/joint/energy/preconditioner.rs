@@ -1,17 +1,18 @@
-//! The preconditioner: exact solutions along the columns of cells.
+//! The preconditioner: exact solutions along the columns of cells, and of a smooth phase across them (J46).
 
 use super::blocks::{Block, bend_diagonal, block, difference_diagonal};
 use super::plane::{Derivatives, Fields, Plane, STRIDE, VECTORS, Weights, place, row, total};
+use super::splines::{self, Products, Splines, Square};
 use crate::joint::model::count;
 use crate::joint::params::energy::{CONTRAST_RIDGE, PIVOT_RIDGE, RIDGE, SIDE};
-use crate::parallel::lanes::{LANES, Lanes};
+use crate::parallel::lanes::{LANES, Lanes, less, plus, times};
 use multiversion::multiversion;
 
 /// Factor of the diagonals. Where only the ridges determine cells, as in a column of cells without data, rounding makes pivots 0 or
 /// negative, and the tile would have no phase. What this adds is larger than any rounding.
 const STABLE: f32 = 1.0 + PIVOT_RIDGE;
 
-/// The factors of the matrix M = L D L^T, column by column. Columns follow the fringes. Without them, streaks of phase and colour
+/// The factors of the matrix M = L D L^T, column by column, and those of the splines. Columns follow the fringes. Without them, streaks of phase and colour
 /// along a fringe converge slowly. Within a cell, the albedos answer to phase and contrast, and the contrast to the phase.
 #[derive(Debug, Default)]
 pub(super) struct Preconditioner {
@@ -30,9 +31,11 @@ pub(super) struct Preconditioner {
     /// Inverse pivots of the albedos, and the coupling of each of them with that of the row below, negative.
     albedo: [Plane; 4],
     coupling: Plane,
+    /// The second part.
+    pub splines: Splines,
 }
 
-/// Factors the matrices of the columns of a tile.
+/// Factors the matrices of the columns of a tile, and that of its splines.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 pub(super) fn prepare(
     lines: &mut Preconditioner,
@@ -41,17 +44,23 @@ pub(super) fn prepare(
     ratios: [f32; 4],
 ) {
     let share = 1.0 / count(ratios);
+    lines.splines.clear();
     for x in (0..SIDE).step_by(LANES) {
-        let mut above = Pivots::default();
+        let (mut above, mut square) = (Pivots::default(), Square::default());
         for y in 0..SIDE {
             let at = place(x, y);
             let local = block(derivatives, weights, ratios, at);
             lines.follow(derivatives, &local, at);
             lines.albedos(weights, share, &local.albedo, at);
             let coupled = lines.contrast(weights, &local, at);
-            lines.bend(weights, &local.phase, coupled, at, &mut above);
+            let known = lines.bend(weights, &local.phase, coupled, at, &mut above);
+            square.add(weights, known, at, y);
+            if y % LANES == LANES - 1 {
+                lines.splines.add(&std::mem::take(&mut square), x / LANES, y);
+            }
         }
     }
+    lines.splines.factor();
 }
 
 /// What the factors of a row need of the two rows above.
@@ -119,15 +128,23 @@ impl Preconditioner {
         coupled
     }
 
-    /// Factors of the phase.
+    /// Factors of the phase; returns the information that is left once the contrast follows.
     #[inline(always)]
-    fn bend(&mut self, weights: &Weights, known: &Lanes, coupled: Lanes, at: usize, above: &mut Pivots) {
+    fn bend(
+        &mut self,
+        weights: &Weights,
+        known: &Lanes,
+        coupled: Lanes,
+        at: usize,
+        above: &mut Pivots,
+    ) -> Lanes {
         let [_, down, mixed] = &weights.bend;
         let diagonal = bend_diagonal(weights, at);
         let (here, last) = (down.get(at), down.get(at - STRIDE));
         let (corner, corner_left) = (mixed.get(at - STRIDE), mixed.get(at - STRIDE - 1));
-        let [mut inverse, mut first, mut second] = [[0.0; LANES]; 3];
+        let [mut inverse, mut first, mut second, mut left] = [[0.0; LANES]; 4];
         for x in 0..LANES {
+            left[x] = known[x] + RIDGE - coupled[x];
             second[x] = last[x] * above.inverse[0][x];
             let next = -2.0 * (here[x] + last[x]) - corner[x] - corner_left[x] - last[x] * above.first[x];
             first[x] = next * above.inverse[1][x];
@@ -138,6 +155,7 @@ impl Preconditioner {
         self.phase_first.set(at, first);
         self.phase.set(at, inverse);
         *above = Pivots { inverse: [above.inverse[1], inverse], first };
+        left
     }
 }
 
@@ -149,16 +167,17 @@ impl Preconditioner {
 /// takes more than twice as long.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 pub(super) fn move_along(
-    lines: &Preconditioner,
+    lines: &mut Preconditioner,
     length: f32,
     direction: &Fields,
     product: &mut Fields,
     step: &mut Fields,
     residual: &mut Fields,
 ) -> f64 {
-    let mut size = 0.0;
+    let (mut size, mut sums, mut smooth) = (0.0, Products::default(), splines::NONE);
     for y in 0..SIDE {
-        lines.eliminate(y, product);
+        let phase = lines.eliminate(y, product);
+        sums.add(y, &phase, &mut smooth);
         let pivots = lines.pivots().into_iter().zip(product.planes());
         let changed =
             residual.planes_mut().into_iter().zip(direction.planes().into_iter().zip(step.planes_mut()));
@@ -173,15 +192,15 @@ pub(super) fn move_along(
         }
         size += total(squares);
     }
-    size
+    size + lines.splines.take(length, smooth)
 }
 
 /// New search direction: M^-1 r plus `share` of the old direction, for a residual that is kept as L^-1 r.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 pub(super) fn turn(lines: &Preconditioner, residual: &Fields, share: f32, direction: &mut Fields) {
-    let mut below = Below::default();
+    let (mut below, smooth) = (Below::default(), lines.splines.solved());
     for y in (0..SIDE).rev() {
-        lines.substitute(y, residual, share, &mut below, direction);
+        lines.substitute(y, residual, &smooth.row(y), share, &mut below, direction);
     }
 }
 
@@ -194,36 +213,6 @@ struct Below {
     contrast: [Lanes; VECTORS],
 }
 
-/// `value - factor * by` in every cell.
-#[inline(always)]
-fn less(value: Lanes, factor: Lanes, by: Lanes) -> Lanes {
-    let mut out = [0.0; LANES];
-    for x in 0..LANES {
-        out[x] = value[x] - factor[x] * by[x];
-    }
-    out
-}
-
-/// `value + factor * by` in every cell.
-#[inline(always)]
-fn plus(value: Lanes, factor: Lanes, by: Lanes) -> Lanes {
-    let mut out = [0.0; LANES];
-    for x in 0..LANES {
-        out[x] = value[x] + factor[x] * by[x];
-    }
-    out
-}
-
-/// The product in every cell.
-#[inline(always)]
-fn times(value: Lanes, factor: Lanes) -> Lanes {
-    let mut out = [0.0; LANES];
-    for x in 0..LANES {
-        out[x] = value[x] * factor[x];
-    }
-    out
-}
-
 impl Preconditioner {
     /// Inverse pivots, in the order of the planes of fields.
     #[inline(always)]
@@ -232,9 +221,9 @@ impl Preconditioner {
         [&self.phase, red, green, blue, infrared, &self.contrast]
     }
 
-    /// Forward elimination of row `y`.
+    /// Forward elimination of row `y`; returns its phase once albedo and contrast follow, before the rows above are taken from it.
     #[inline(always)]
-    fn eliminate(&self, y: usize, out: &mut Fields) {
+    fn eliminate(&self, y: usize, out: &mut Fields) -> [Lanes; VECTORS] {
         let Fields { phase, albedo, contrast } = out;
         for c in 0..4 {
             for at in row(y) {
@@ -245,19 +234,31 @@ impl Preconditioner {
                 albedo[c].set(at, less(log, first, albedo[c].get(at - STRIDE)));
             }
         }
-        for at in row(y) {
+        let mut phases = [[0.0; LANES]; VECTORS];
+        for (i, at) in row(y).enumerate() {
             let slow = contrast.get(at);
             let mut value = less(phase.get(at), self.contrast_by_phase.get(at), slow);
+            phases[i] = value;
             value = less(value, self.phase_first.get(at), phase.get(at - STRIDE));
             phase.set(at, less(value, self.phase_second.get(at), phase.get(at - 2 * STRIDE)));
             contrast.set(at, less(slow, self.contrast_first.get(at), contrast.get(at - STRIDE)));
         }
+        phases
     }
 
-    /// Back substitution of row `y`; then albedos and contrast follow. The result and `share` of the old direction are the new one.
+    /// Back substitution of row `y`; then the phase of the splines is added, and albedos and contrast follow. The result and `share` of
+    /// the old direction are the new one.
     #[inline(always)]
-    fn substitute(&self, y: usize, residual: &Fields, share: f32, below: &mut Below, direction: &mut Fields) {
-        let [mut phases, mut contrasts] = [[[0.0; LANES]; VECTORS]; 2];
+    fn substitute(
+        &self,
+        y: usize,
+        residual: &Fields,
+        smooth: &[Lanes; VECTORS],
+        share: f32,
+        below: &mut Below,
+        direction: &mut Fields,
+    ) {
+        let [mut columns, mut phases, mut contrasts] = [[[0.0; LANES]; VECTORS]; 3];
         for (i, at) in row(y).enumerate() {
             let mut phase = times(residual.phase.get(at), self.phase.get(at));
             let mut contrast = times(residual.contrast.get(at), self.contrast.get(at));
@@ -265,6 +266,8 @@ impl Preconditioner {
             phase = less(phase, self.phase_second.get(at + 2 * STRIDE), below.phase[1][i]);
             contrast = less(contrast, self.contrast_first.get(at + STRIDE), below.contrast[i]);
             below.contrast[i] = contrast;
+            columns[i] = phase;
+            phase = plus(phase, [1.0; LANES], smooth[i]);
             contrast = less(contrast, self.contrast_by_phase.get(at), phase);
             (phases[i], contrasts[i]) = (phase, contrast);
             direction.phase.set(at, plus(phase, [share; LANES], direction.phase.get(at)));
@@ -280,6 +283,6 @@ impl Preconditioner {
                 direction.albedo[c].set(at, plus(log, [share; LANES], direction.albedo[c].get(at)));
             }
         }
-        below.phase = [phases, below.phase[0]];
+        below.phase = [columns, below.phase[0]];
     }
 }

@@ -6,7 +6,7 @@
 
 use super::plane::{Derivatives, Fields, Plane, STRIDE, Weights, total, vectors};
 use super::scales::Scales;
-use super::solve::{Effort, solve};
+use super::solve::solve;
 use super::start::{contrast_and_albedo, filter};
 use super::tile::Tile;
 use super::value::{Given, add_energy};
@@ -50,7 +50,7 @@ impl Tile {
         let scales = self.scales;
         self.scales = Scales { noise, misfit: 1.0, bend: SCALE_LIMITS[0].powi(2), ..scales };
         contrast_and_albedo(self, SURROUNDINGS_SHARE);
-        self.descend(noise, self.scales.bend, 1, Effort::stiff());
+        self.descend(noise, self.scales.bend, 1);
         keep_lower(self, kept, &scales)
     }
 
@@ -64,7 +64,7 @@ impl Tile {
         residual.clear();
         // The surface continues through cells without light.
         vectors().for_each(|at| inside.set(at, [1.0; LANES]));
-        solve(self, Effort::usual());
+        solve(self);
         std::mem::swap(&mut self.inside, &mut self.lit);
         take_step(self)
     }

@@ -4,35 +4,12 @@ use super::plane::{Column, Derivatives, Fields, Plane, STRIDE, Weights, four, ro
 use super::preconditioner::{move_along, prepare, turn};
 use super::tile::Tile;
 use crate::joint::model::{count, weights as channel_weights};
-use crate::joint::params::energy::{
-    CONTRAST_RIDGE, INNER_STEPS, NEGLIGIBLE, RESIDUAL_LEFT, RIDGE, SIDE, STIFF_INNER_STEPS,
-    STIFF_RESIDUAL_LEFT,
-};
+use crate::joint::params::energy::{CONTRAST_RIDGE, INNER_STEPS, NEGLIGIBLE, RESIDUAL_LEFT, RIDGE, SIDE};
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
 
-/// When conjugate gradients end.
-#[derive(Clone, Copy)]
-pub(super) struct Effort {
-    /// Greatest number of steps.
-    steps: usize,
-    /// Share of the squared residual, in the norm of the preconditioner.
-    residual_left: f64,
-}
-
-impl Effort {
-    pub fn usual() -> Self {
-        Self { steps: INNER_STEPS, residual_left: RESIDUAL_LEFT }
-    }
-
-    /// For a stiff surface at the later starts.
-    pub fn stiff() -> Self {
-        Self { steps: STIFF_INNER_STEPS, residual_left: STIFF_RESIDUAL_LEFT }
-    }
-}
-
 /// Solves the normal equations for the step, starting from the negative gradient in `residual`.
-pub(super) fn solve(tile: &mut Tile, effort: Effort) {
+pub(super) fn solve(tile: &mut Tile) {
     let Tile {
         unknown,
         derivatives,
@@ -55,9 +32,9 @@ pub(super) fn solve(tile: &mut Tile, effort: Effort) {
     let negligible =
         NEGLIGIBLE * f64::from(scales.noise) * vectors().map(|at| total(inside.get(at))).sum::<f64>();
     let mut size = move_along(preconditioner, 1.0, direction, product, step, residual);
-    let enough = negligible.max(effort.residual_left * size);
+    let enough = negligible.max(RESIDUAL_LEFT * size);
     let mut share = 0.0;
-    for _ in 0..effort.steps {
+    for _ in 0..INNER_STEPS {
         if size <= enough {
             break;
         }

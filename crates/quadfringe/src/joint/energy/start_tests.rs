@@ -1,7 +1,6 @@
 //! The second and the third start.
 
 use super::plane::{Plane, total, vectors};
-use super::solve::Effort;
 use super::start::contrast_and_albedo;
 use super::tests::{Errors, RATIOS, errors, random, tile};
 use super::tile::Tile;
@@ -53,7 +52,7 @@ fn photographed() -> Case {
 fn first_error(Case { mut tile, truth }: Case) -> f32 {
     tile.unknown.phase.copy(&tile.start);
     contrast_and_albedo(&mut tile, 1.0);
-    tile.descend(NOISE, tile.scales.bend, OUTER_STEPS, Effort::usual());
+    tile.descend(NOISE, tile.scales.bend, OUTER_STEPS);
     errors(&tile, &truth).rms
 }
 

@@ -1,6 +1,6 @@
 //! Variance of the phase at the minimum (U13), (U14), (U17), (U18), (U19).
 
-use super::bias::{self, bias};
+use super::bias::{Minimum, Work, bias};
 use super::blocks::phase_information;
 use super::disagreement::disagreement;
 use super::plane::{Fields, Plane, vectors};
@@ -41,8 +41,10 @@ fn add_variance(tile: &mut Tile, noise: f32, out: &mut Plane) {
         }
         corrections.set(at, square);
     }
-    let work = bias::Work { pull, known, spare: &mut *spare };
-    bias(&residual.phase, information, scales.misfit, work, biases);
+    let work = Work { pull, known, spare: &mut *spare };
+    let minimum =
+        Minimum { gradient: &residual.phase, information, bend: &weights.bend[0], noise: scales.misfit };
+    bias(&minimum, work, biases);
     // A saturated cell has no information by itself; its neighbours determine it.
     smooth(information, spare);
     average_lit(corrections, inside, [pull, spare]);
