@@ -124,6 +124,14 @@ def test_the_fault_of_the_second_shape_has_the_other_sign(stage: Stage, plane: q
     hold("compare.exponent_share", [visible / -0.2, infrared / -0.2])
 
 
+def test_the_order_of_a_pair_changes_no_cause(stage: Stage, plane: qf.Shape) -> None:
+    bent = stage.shape(stage.bench.cast("plane"), 4, projector_exponent=(1.1,) * 4)
+    first, second = (qf.compare(*pair).causes[0] for pair in ((bent, plane), (plane, bent)))
+    assert first.name == second.name == "gamma"
+    assert first.size == pytest.approx(second.size)
+    assert first.share == pytest.approx(second.share)
+
+
 def test_half_the_light_is_named(stage: Stage, plane: qf.Shape) -> None:
     dim = stage.shape(stage.bench.cast("plane"), 4, gain=(0.5,) * 4)
     assert [one.name for one in qf.compare(dim, plane).causes] == ["less light"]

@@ -158,6 +158,20 @@ def test_a_wrong_response_is_named_as_decoding(exponent: float) -> None:
         assert "decoding waves" in names
 
 
+def test_the_light_tells_a_wrong_response_before_the_calibration() -> None:
+    shot, calibration = taken(exponent=1.3)
+    unknown = baseline(calibration).model_copy(update={"response": None})
+    bad(found := examine_board(shot, plan_of(unknown), BOARD))
+    one = {each.name: each for each in found}
+    assert found[0].found.startswith("the decoding is at fault: decoding response"), found[0].found
+    assert found[0].fix == one["decoding response"].fix
+    assert "quadfringe calibrate response" in found[0].fix
+    assert one["calibration scale"].grade == "note"
+    assert "examine again" in one["calibration scale"].fix
+    bad(mended := examine_board(shot, plan_of(unknown, "auto"), BOARD))
+    assert mended[0].found.startswith("the calibration is at fault: calibration scale"), mended[0].found
+
+
 def with_wrong_orders(shape: qf.Shape, where: NDArray[np.bool_]) -> qf.Shape:
     """Move pixels along their rays as an order would, by 30 mm at 800 mm."""
     assert shape.xyz_mm is not None

@@ -14,7 +14,7 @@ from quadfringe.decoding.stages import linear_light
 from quadfringe.decoding.verdict import order_margin
 from quadfringe.errors import InputError
 
-__all__ = ["SHOTS_TRIED", "decode_straightened", "estimate_response", "response_in_place_of"]
+__all__ = ["SHOTS_TRIED", "decode_straightened", "estimate_response", "response_in_place_of", "response_left"]
 
 # Rounds of decoding and estimating. Each takes a part of the distortion out of the phase: on faces and steps of the
 # virtual bench, gammas of 1.2 to 2.6 settle in one to three rounds. The limit bounds the time of a shot whose estimates
@@ -89,8 +89,19 @@ def response_in_place_of(stated: KernelDecoder, shot: AnyShot) -> KernelDecoder:
     return stated.with_response(found.response, found.evidence)
 
 
-def _estimate(shot: AnyShot, shape: Shape, plan: Plan) -> ShotResponse:
-    light, fringes = linear_light(shot, plan.calibration), plan.fringes
+def response_left(shot: AnyShot, shape: Shape, plan: Plan) -> ShotResponse:
+    """Estimate the response that a shot shows beyond the one that its shape was decoded with; linear when it is right.
+
+    The light tells it, whatever form the shape has.
+    """
+    used = shape.config["response"]
+    return _estimate(shot, shape, plan, "linear" if used is None else Response(**used))
+
+
+def _estimate(
+    shot: AnyShot, shape: Shape, plan: Plan, undone: Response | Literal["calibration", "linear"] = "calibration"
+) -> ShotResponse:
+    light, fringes = linear_light(shot, plan.calibration, undone), plan.fringes
     return shot_response(light, shape.phase_rad, fringes.code, plan.projector_width_px, fringes.columns_px)
 
 

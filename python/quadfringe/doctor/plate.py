@@ -1,27 +1,32 @@
 """Checks of a shot of a board or of a flat plate, which tell a fault of the calibration from one of the decoding.
 
-A wrong calibration bends and scales the whole field smoothly and leaves points where they repeat; wrong decoding leaves
-the field straight and scatters points, in waves along the fringes or by whole orders.
+A wrong calibration bends and scales the whole field smoothly and leaves points where they repeat; wrong decoding
+scatters points, in waves along the fringes or by whole orders. A wrong response may bend the field as well. The light
+of the shot tells it, whatever form was measured, and what it may have bent is judged once the response is right.
 """
 
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 
 from quadfringe.calibration.detect import TargetNotFoundError
 from quadfringe.calibration.targets import Target, ring_board
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import Decoder, Plan
+from quadfringe.decoding.response import response_left
 from quadfringe.doctor import _params as limits
 from quadfringe.doctor.board import BoardPoints, measure_board
 from quadfringe.doctor.finding import Finding, graded
 from quadfringe.doctor.flatness import Flatness, flatness_of
+from quadfringe.doctor.shot import judged_linearity
 from quadfringe.errors import DecodeError, DecodeWarning, InputError
 
 __all__ = ["examine_board", "examine_plane", "judged_board", "judged_plate"]
 
 CALIBRATE = "calibrate again: quadfringe calibrate, with tilted poses over the whole field"
 FLAT = "if the {} itself is flat to that"
+BENT = "calibration scale", "calibration form", "calibration bow"  # what a wrong response changes too
 
 
 def examine_board(shot: AnyShot, plan: Plan, target: Target | None = None) -> list[Finding]:
@@ -39,7 +44,8 @@ def examine_board(shot: AnyShot, plan: Plan, target: Target | None = None) -> li
     if isinstance(decoded, Finding):
         return [decoded]
     try:
-        return judged_board(measure_board(shot, decoded, plan, target or ring_board()))
+        board = measure_board(shot, decoded, plan, target or ring_board())
+        return judged_board(board, _response(shot, decoded, plan))
     except TargetNotFoundError as error:
         return [
             Finding("board", "fault", str(error), "name another board with --target FILE.json if it is another one")
@@ -54,7 +60,7 @@ def examine_plane(shot: AnyShot, plan: Plan) -> list[Finding]:
     if isinstance(decoded, Finding):
         return [decoded]
     try:
-        return _with_verdict(judged_plate(flatness_of(decoded), "plate"))
+        return _with_verdict(judged_plate(flatness_of(decoded), "plate"), _response(shot, decoded, plan))
     except InputError as error:
         return [Finding("plate", "fault", str(error), "examine the shot without --plane first")]
 
@@ -70,12 +76,21 @@ def _decoded(shot: AnyShot, plan: Plan) -> Shape | Finding:
         return Finding(f"decoding {error.reason or 'fringe orders'}", "fault", str(error), error.fix)
 
 
-def judged_board(board: BoardPoints) -> list[Finding]:
-    """Judge a measured board; the verdict comes first."""
+def _response(shot: AnyShot, shape: Shape, plan: Plan) -> Finding:
+    """Judge the response by the light of a decoded shot; one that the shot does not show for sure is good."""
+    harmonics = {name: one["second_harmonic_before"] for name, one in response_left(shot, shape, plan).evidence.items()}
+    if not harmonics:
+        return Finding("decoding response", "good", "the light shows no response that is not corrected")
+    worst = max(harmonics, key=lambda name: abs(harmonics[name]))
+    return judged_linearity("decoding response", worst, abs(harmonics[worst]), plan)
+
+
+def judged_board(board: BoardPoints, response: Finding | None = None) -> list[Finding]:
+    """Judge a measured board, with the finding on the response of its shot if known; the verdict comes first."""
     words = f"the {board.points} points lie {board.reprojection_px:.2f} px (RMS) from those of the board in the image"
     fix = f"{CALIBRATE}; check that the board is the one that was measured, and flat"
     camera = graded("calibration camera", board.reprojection_px, limits.REPROJECTION_PX, words, fix)
-    return _with_verdict([camera, _scale(board), _form(board), *judged_plate(board.plate, "board")])
+    return _with_verdict([camera, _scale(board), _form(board), *judged_plate(board.plate, "board")], response)
 
 
 def _scale(board: BoardPoints) -> Finding:
@@ -133,17 +148,26 @@ def _orders(plate: Flatness) -> Finding:
     return graded("decoding orders", plate.displaced_share, limits.WRONG_ORDERS, words, fix)
 
 
-def _with_verdict(found: list[Finding]) -> list[Finding]:
-    """Put in front which of the two is at fault, by the gravest finding of each."""
+def _with_verdict(found: list[Finding], response: Finding | None = None) -> list[Finding]:
+    """Put in front which of the two is at fault, by the gravest finding of each, and the response, if known."""
+    if response is not None:
+        found = [response, *(found if response.grade == "good" else map(_after_response, found))]
     at_fault = [what for what in ("calibration", "decoding") if any(_is_bad(one, what) for one in found)]
     if not at_fault:
         return [Finding("verdict", "good", "neither the calibration nor the decoding is at fault"), *found]
     grave = "fault" if any(one.grade == "fault" for one in found) else "warning"
-    names = ", ".join(one.name for one in found if one.grade != "good")
+    names = ", ".join(one.name for one in found if _is_bad(one))
     words = f"the {' and the '.join(at_fault)} {'is' if len(at_fault) == 1 else 'are'} at fault: {names}"
     fix = next(one.fix for one in found if one.grade == grave)
     return [Finding("verdict", "fault" if grave == "fault" else "warning", words, fix), *found]
 
 
-def _is_bad(one: Finding, what: str) -> bool:
-    return one.grade != "good" and one.name.startswith(what)
+def _after_response(one: Finding) -> Finding:
+    """Put off what a wrong response changes too: it shows nothing of the calibration until the response is right."""
+    if one.name not in BENT or not _is_bad(one):
+        return one
+    return replace(one, grade="note", fix="correct the response, which changes this too, and examine again")
+
+
+def _is_bad(one: Finding, what: str = "") -> bool:
+    return one.grade not in ("good", "note") and one.name.startswith(what)

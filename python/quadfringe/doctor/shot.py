@@ -24,7 +24,7 @@ from quadfringe.decoding.symptoms import brightness, saturation
 from quadfringe.doctor.finding import Finding, graded, told
 from quadfringe.errors import DecodeError, DecodeWarning
 
-__all__ = ["examine_shot"]
+__all__ = ["examine_shot", "judged_linearity"]
 
 # From cause to effect: what is named earlier brings about what follows. Wrong bits make an image dark, clipped crests
 # have harmonics, and blur lets one channel seem to see another.
@@ -183,12 +183,17 @@ def _amplitudes(fit: Fit, tops: Mapping[str, float]) -> list[Finding]:
 def _linearity(fit: Fit, plan: Plan) -> Finding:
     sure = fit.harmonic_least > fit_params.SOUND
     worst = int(np.argmax(np.where(sure, fit.harmonic, 0) if sure.any() else fit.harmonic))
-    value, least = float(fit.harmonic[worst]), float(fit.harmonic_least[worst])
-    words = f"the second harmonic of {fit.names[worst]} is {value:.1%} of the first"
+    found = judged_linearity("response", fit.names[worst], float(fit.harmonic[worst]), plan)
+    return _if_sure(found, float(fit.harmonic_least[worst]))
+
+
+def judged_linearity(name: str, channel: str, harmonic: float, plan: Plan) -> Finding:
+    """Judge the ratio of the second harmonic of the fringes of a channel to the first, as the finding `name`."""
+    words = f"the second harmonic of {channel} is {harmonic:.1%} of the first"
     known = isinstance(stated_response(plan.response, plan.calibration), Response)
     again = "estimate it again" if known else "estimate it"
     fix = f"switch off the gamma table of the projector, or {again}: quadfringe calibrate response"
-    return _if_sure(graded("response", value, NOT_LINEAR, words, fix), least)
+    return graded(name, harmonic, NOT_LINEAR, words, fix)
 
 
 def _crosstalk(fit: Fit, plan: Plan) -> Finding:

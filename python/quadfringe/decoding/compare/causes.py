@@ -60,7 +60,9 @@ def _form(pair: Pair, difference_px: Map, rest_px: Map, overall: Deviations) -> 
     """Name a smooth difference; also give the form, px, or 0 when it is not named."""
     known = np.isfinite(rest_px)
     fitted = fit_form(rest_px)
-    share = share_explained(difference_px, fitted.form, rest_px)
+    # What the waves are taken to be has a form as well: the rest may show one that the difference does not have.
+    alone = share_explained(difference_px, fit_form(difference_px).form)
+    share = min(alone, share_explained(difference_px, fitted.form, rest_px))
     size_px = float(np.sqrt(np.mean(fitted.form[known] ** 2)))
     sigma = combined_uncertainty(pair, "rad")
     typical = float(np.nanmedian(sigma[known])) * pair.period_px / (2 * np.pi) if sigma is not None else 0.0

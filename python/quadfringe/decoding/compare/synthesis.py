@@ -1,8 +1,8 @@
-"""What a fault of the light does to a shape: shots with and without it, made from the shape and decoded as it was.
+"""What a fault of the light does to a shape: shots with and without it, made from a sound shape and decoded alike.
 
 A fault of a channel moves the phase in a way that depends on the decoder: how it weighs the channels, and how far it
-smooths. So the decoder itself is asked. From the columns of a shape follows the light of every channel without any
-fault (D3); with a little of a fault added, the decoder gives columns that differ by the pattern of that fault.
+smooths. So the decoder itself is asked. From the columns of a sound shape follows the light of every channel without
+any fault (D3); with a little of a fault added, the decoder gives columns that differ by the pattern of that fault.
 """
 
 from __future__ import annotations

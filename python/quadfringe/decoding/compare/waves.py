@@ -1,8 +1,8 @@
 """Gamma and crosstalk: how much of a difference these faults explain.
 
 `synthesis` makes the pattern of every fault. The fit is least squares over offset, tilt, bow and the patterns together
-(D4), so that what is smooth over the image speaks for no fault. Decoders are not quite linear: what a family explains
-is measured with one more shot, which has all its faults in the sizes that were found.
+(D4), so that what is smooth over the image speaks for no fault. Decoders are not linear: what a family explains is
+measured with one more shot, which has all its faults in the sizes that were found, scaled to the difference.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from quadfringe.decoding.compare.forms import polynomials, share_explained
 from quadfringe.decoding.compare.pixels import Pair
 from quadfringe.decoding.compare.results import Explanation
 from quadfringe.decoding.compare.synthesis import CHANNELS, GAMMAS, STRAYS, Faults, Maker, Member, recipe_of
+from quadfringe.decoding.plan import Plan
 
 __all__ = ["Family", "Waves", "waves_of"]
 
@@ -60,23 +61,21 @@ class Waves:
 
 
 def waves_of(pair: Pair, difference_px: Map) -> Waves:
-    """Name gamma and crosstalk of the shot behind A, or behind B if A is no single shot; nothing when neither is."""
+    """Name gamma and crosstalk of the single shot, A or B, whose light may be at fault; nothing without one."""
     difference_px = _trimmed(difference_px)
     band = _band(np.isfinite(difference_px))
-    sources = ((shape, sign) for shape, sign in ((pair.a, 1), (pair.b, -1)) if isinstance(shape, Shape))
-    source = next(((shape, sign, plan) for shape, sign in sources if (plan := recipe_of(shape)) is not None), None)
+    source = _source(pair, np.isfinite(difference_px))
     if source is None or int(np.isfinite(difference_px[band]).sum()) < params.PIXELS_MIN:
         return Waves()
-    shape, sign, plan = source
-    column_px = np.where(np.isfinite(pair.column_b_px), pair.column_b_px, pair.column_a_px)[band]
-    maker = Maker(column_px, shape.modulation[band].astype(np.float64), plan)
+    shape, plan, sign = source.shape, source.plan, source.sign
+    maker = Maker(source.column_px[band], shape.modulation[band].astype(np.float64), plan)
     values = sign * difference_px[band]  # of the source over the other
     families = _families(maker, values, pair.period_px)
     found, explained = [], np.zeros(values.shape)
     for number, family in enumerate(families):
         if not _is_named(family, number):
             break
-        part = _confirmed(maker, family)
+        part = _confirmed(maker, family, values - explained)
         words = _gamma_words if family.name == "gamma" else _crosstalk_words
         share = share_explained(values, part, values - explained)
         if number and share < params.WAVES_MORE:
@@ -88,6 +87,44 @@ def waves_of(pair: Pair, difference_px: Map) -> Waves:
     whole = np.full(difference_px.shape, np.nan)
     whole[band] = sign * explained
     return Waves(tuple(found), whole, families)
+
+
+@dataclass(frozen=True)
+class _Source:
+    """The shape whose light is at fault if any is, its plan, its sign in A less B, and the columns of the other one."""
+
+    shape: Shape
+    plan: Plan
+    sign: int
+    column_px: Map
+
+
+def _source(pair: Pair, known: Mask) -> _Source | None:
+    """Choose the shape of a single shot whose albedo keeps more of the fringes; None when neither is a single shot."""
+    a, b = pair.column_a_px, pair.column_b_px
+    sources = [
+        _Source(shape, plan, sign, np.where(np.isfinite(other), other, its))
+        for shape, sign, its, other in ((pair.a, 1, a, b), (pair.b, -1, b, a))
+        if isinstance(shape, Shape) and (plan := recipe_of(shape)) is not None
+    ]
+    return max(sources, key=lambda one: _fringes_left(one.shape, one.plan, known), default=None)
+
+
+def _fringes_left(shape: Shape, plan: Plan, known: Mask) -> float:
+    """Give the largest amplitude of the fringes of a channel in its albedo, relative to it; 0 without albedo.
+
+    Light that is linear and of one channel alone leaves none, while gamma leaves them in all channels.
+    """
+    if shape.albedo is None:
+        return 0.0
+    turns = 2 * np.pi * shape.column_px[known].astype(np.float64) / plan.projector_width_px
+    found = [0.0]
+    for channel, number in enumerate(plan.fringes.channel_numbers):
+        light = shape.albedo[..., channel][known].astype(np.float64)
+        if (seen := np.isfinite(light)).any():
+            relative = light[seen] / light[seen].mean() - 1
+            found.append(2 * abs(np.mean(relative * np.exp(1j * number * turns[seen]))))
+    return float(max(found))
 
 
 def _is_named(family: Family, number: int) -> bool:
@@ -102,7 +139,7 @@ def _families(maker: Maker, values: Map, period_px: float) -> tuple[Family, Fami
     first, second = sorted(fitted, key=lambda family: -family.alone)
     if first.alone < params.WAVES_SHARE:
         return first, second
-    rest = values - _confirmed(maker, first)
+    rest = values - _confirmed(maker, first, values)
     again = _fitted(second.name, second.members, second.patterns, rest, period_px)
     more = again.alone * _ratio(rest, values)
     return first, Family(second.name, second.members, second.patterns, again.sizes, second.alone, more)
@@ -115,10 +152,16 @@ def _ratio(rest: Map, values: Map) -> float:
     return left / whole if whole > 0 else 0.0
 
 
-def _confirmed(maker: Maker, family: Family) -> Map:
-    """Make the shot with all faults of a family, and give the columns that they add, (H, W) px."""
-    faults = Faults.from_sizes(family.name, family.members, family.sizes)
-    return maker.columns_off_px(faults)
+def _confirmed(maker: Maker, family: Family, values: Map) -> Map:
+    """Make the shot with all faults of a family, and give the columns that they add, (H, W) px, scaled to the values.
+
+    The sizes are linear estimates: the decoder may add several times of what they would.
+    """
+    part = maker.columns_off_px(Faults.from_sizes(family.name, family.members, family.sizes))
+    known = np.isfinite(part) & np.isfinite(values)
+    added, plain = (_smoothed_out(np.where(known, m, np.nan))[known] for m in (part, values))
+    power = float(added @ added)
+    return part * max(0.0, float(added @ plain) / power) if power > 0 else part
 
 
 def _fitted(name: str, members: tuple[Member, ...], patterns: Map, values: Map, period_px: float) -> Family:
