@@ -182,9 +182,9 @@ impl Joint {
     /// Step 6: the minimum of the energy, with this `detail`.
     fn minimise(&mut self, frame: &Frame<'_>, detail: f32) {
         let scene = self.pyramid.full.scene(frame.full);
-        let [red, _, blue, _] = scene.light;
-        // Fine texture of a cloth is no noise: the albedo of a cell takes it up.
-        let noise = self.coarse.noise.min(noise_of_difference([red, blue], scene.grid));
+        let [red, green, ..] = scene.light;
+        // Texture finer than a cell, as of a cloth, is no noise: the albedo of the cell takes it up.
+        let noise = self.coarse.noise.min(noise_of_difference([red, green], scene.grid));
         let prior = Prior { ratios: self.ratios, noise, detail };
         self.energy.minimise(&scene, prior, &mut self.pixels);
         let Pixels { phase, modulation, .. } = &mut self.pixels;

@@ -163,3 +163,34 @@ fn median(mut values: Vec<f32>) -> f32 {
     let (_, median, _) = values.select_nth_unstable_by(middle, f32::total_cmp);
     *median
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A number in [-1, 1] for each seed and place.
+    fn random(seed: usize, at: usize) -> f32 {
+        let mut state = (seed * 7919 + at).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        state ^= state >> 29;
+        state = state.wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        (state >> 40) as f32 / (1u32 << 23) as f32 - 1.0
+    }
+
+    #[test]
+    fn texture_that_two_channels_share_is_no_noise() {
+        let grid = Grid::new([256, 256], 8.0);
+        let plane = |noise: f32, texture: f32, seed: usize| -> Vec<f32> {
+            (0..grid.pixels()).map(|at| 0.5 + texture * random(9, at) + noise * random(seed, at)).collect()
+        };
+        // Uniform noise in [-a, a] has the standard deviation a / sqrt 3.
+        let expected = 0.03 / 3f32.sqrt();
+        let noise = |texture: f32| {
+            let [red, green] = [1, 2].map(|seed| plane(0.03, texture, seed));
+            [noise_of_image(&red, &grid), noise_of_difference([&red, &green], &grid)]
+        };
+        let [alone, difference] = noise(0.0);
+        assert!((alone / expected - 1.0).abs() < 0.05 && (difference / expected - 1.0).abs() < 0.05);
+        let [alone, difference] = noise(0.04);
+        assert!(alone > 1.5 * expected && (difference / expected - 1.0).abs() < 0.05, "{alone} {difference}");
+    }
+}
