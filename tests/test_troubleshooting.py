@@ -29,6 +29,7 @@ VARIABLE = {
     ("name", "calibration"): ("camera", "projector", "infrared"),
     ("name", "finding"): (),  # in `graded`
     ("name", "screens"): ("… screen",),
+    ("name", "shot"): ("response", "decoding response"),
     ("one.name", "shot"): ("modulation …",),
 }
 # A name that another error or cause already has.

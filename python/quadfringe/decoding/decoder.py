@@ -141,8 +141,10 @@ def judged(shape: Shape, shot: AnyShot, plan: Plan, kernel: KernelDecoder | None
     cause = None if kernel is None else contradiction(shape, shot, plan) or _taken_out(shape, shot, looked)
     if unexplained:
         rest, cause = (None, cause) if cause and cause.name != ORDERS else (rest, None)
-    light = [*filter(None, (rest, doubt, too_dark(shot, plan.calibration), wrong_bits(shot), too_bright(shot)))]
-    if cause:
+    dark = too_dark(shot, plan.calibration)
+    light = [*filter(None, (rest, doubt, dark, wrong_bits(shot), too_bright(shot)))]
+    # A wrong dark level cuts the fringes off, and their phases tell nothing else until it is right.
+    if cause and not dark:
         # Light that is cut off at either end is named first, because it moves the phases of the channels too.
         if light:
             light.append(replace(cause, fatal=False))

@@ -18,8 +18,7 @@ pub(super) fn noise_of_image(red: &[f32], grid: &Grid) -> f32 {
     deviation(bends(|at| red[at], grid, NOISE_SAMPLES).map(|seen| seen.bend).collect())
 }
 
-/// Noise of a pixel from the difference of two channels, in which texture finer than the mask cancels as far as both share it; in the
-/// unit of the light.
+/// Noise of a pixel from the difference of two channels, in which the texture that they share cancels; in the unit of the light.
 pub(super) fn noise_of_difference([one, other]: [&[f32]; 2], grid: &Grid) -> f32 {
     let bends = bends(|at| one[at] - other[at], grid, NOISE_SAMPLES);
     deviation(bends.map(|seen| seen.bend).collect()) / std::f32::consts::SQRT_2

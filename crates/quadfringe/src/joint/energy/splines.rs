@@ -13,7 +13,7 @@ const COUNT: usize = SPLINES * SPLINES;
 /// Distance in the list of splines of the farthest two that overlap: two rows and two columns.
 const REACH: usize = 2 * SPLINES + 2;
 
-/// One number for each spline, row by row, and zeros as far as they reach.
+/// One number for each spline, row by row, and then as many zeros as their reach.
 type Coefficients = [f64; COUNT + REACH];
 
 /// The three splines of an interval at the middle of each of its cells.
