@@ -151,7 +151,7 @@ def _orders(plate: Flatness) -> Finding:
 def _with_verdict(found: list[Finding], response: Finding | None = None) -> list[Finding]:
     """Put in front which of the two is at fault, by the gravest finding of each, and the response, if known."""
     if response is not None:
-        found = [response, *(found if response.grade == "good" else map(_after_response, found))]
+        found = [response, *(map(_after_response, found) if response.grade == "fault" else found)]
     at_fault = [what for what in ("calibration", "decoding") if any(_is_bad(one, what) for one in found)]
     if not at_fault:
         return [Finding("verdict", "good", "neither the calibration nor the decoding is at fault"), *found]

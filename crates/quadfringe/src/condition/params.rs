@@ -203,6 +203,11 @@ pub(super) const CERTAIN_SDS: f64 = 4.0;
 /// one corrects these, a larger one leaves weak responses. A channel needs twice as much if all together show no response.
 pub(super) const HARMONIC_LEAST: f64 = 0.035;
 
+/// Second harmonic over the first that no texture has in the median of the tiles, so that the light is not linear however uncertain the
+/// exponent is: a few tiles with a wrong phase, as at depth steps, may leave exponent and offset to each other. Smaller: texture counts as
+/// a response. Larger: strong responses are left uncorrected (`cargo test --package quadfringe --test response`).
+pub(super) const HARMONIC_SURE: f64 = 0.15;
+
 /// Standard error that all tiles have in common, as a share of the distance of the exponent from 1. Noise that black
 /// clips, room light and blur move all tiles alike: on painted surfaces with 2 % noise exponents come out too small by 0.05
 /// to 0.15 of that distance. A smaller one states too little (`python evaluation/response_sd.py`).

@@ -28,7 +28,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Family:
-    """The faults of one kind: members, their patterns (H, W, N), px, their sizes (N,) in A over B, and shares.
+    """The faults of one kind: members, their patterns (H, W, N), px, their sizes (N,) in the faulty shape, and shares.
 
     `alone` is the share of the difference, without its smooth part, that the family explains by itself, and `more` what
     it adds once the other family has explained what it can.

@@ -11,8 +11,8 @@ use super::uncertainty::{exponent_sd, harmonic_of_texture, second_harmonic, with
 use super::{Response, ResponseEstimate, fit, offset_bound, root_mean_square};
 use crate::condition::params::{
     BRIGHT_MAX, CERTAIN_SDS, CHANNEL_TILES_MIN, EVENNESS_MIN, EXPONENT_SHARED, GAIN_RAD, HARMONIC_LEAST,
-    HARMONIC_LEFT, MANY_TILES, PHASE_STEPS, SATURATED_MAX, SINGLE_CHANNEL_TILES_MIN, SLOPE_STRIDE_PX,
-    TILE_FRINGES, TILE_MODULATION_MIN, TILE_SIDE_MIN_PX, TILES_MIN,
+    HARMONIC_LEFT, HARMONIC_SURE, MANY_TILES, PHASE_STEPS, SATURATED_MAX, SINGLE_CHANNEL_TILES_MIN,
+    SLOPE_STRIDE_PX, TILE_FRINGES, TILE_MODULATION_MIN, TILE_SIDE_MIN_PX, TILES_MIN,
 };
 use crate::encoding::{Channel, Encoding};
 use crate::{Error, Result};
@@ -87,7 +87,7 @@ pub fn estimate_response_of_shot(
 /// stable estimate.
 ///
 /// A correction that turns the sign of the second harmonic is taken back to where it vanishes. Light stays linear unless the exponent
-/// differs from 1 by several standard errors and the second harmonic shrinks.
+/// differs from 1 by several standard errors, or the second harmonic is larger than that of any texture, and the second harmonic shrinks.
 fn of_channel(traces: &[Trace<'_>], shared: &Shared) -> Option<ResponseEstimate> {
     if traces.len() < CHANNEL_TILES_MIN {
         return None;
@@ -139,7 +139,8 @@ fn total_sd(scatter: f64, taken_back: f64, harmonic_of_texture: f64, exponent: f
 fn is_certain(found: &ResponseEstimate, harmonic_least: f64) -> bool {
     let differs = (f64::from(found.response.exponent) - 1.0).abs() > CERTAIN_SDS * found.exponent_sd;
     let [before, after] = [found.second_harmonic_before, found.second_harmonic_after].map(f64::abs);
-    found.response.knee > 0.0 || (differs && after < before && before > harmonic_least)
+    let shown = differs && before > harmonic_least || before > HARMONIC_SURE;
+    found.response.knee > 0.0 || (shown && after < before)
 }
 
 /// How many tiles see the same pixel: those of a small image overlap by half along both axes.

@@ -10,7 +10,7 @@ use crate::parallel::lanes::LANES;
 struct Window {
     /// Weights of the outer, the next and the middle one of five cells, along both directions.
     weights: [f32; 3],
-    /// Where the weight of the bending relative to the information is the inverse of this, about half of the noise pulls.
+    /// Information over weight of the bending at which half of the noise pulls, or for a cell alone a third.
     stiffness: f32,
     /// Whether the share falls faster on loose surfaces, as that of a cell alone does.
     alone: bool,

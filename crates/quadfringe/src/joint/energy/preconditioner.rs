@@ -12,8 +12,9 @@ use multiversion::multiversion;
 /// negative, and the tile would have no phase. What this adds is larger than any rounding.
 const STABLE: f32 = 1.0 + PIVOT_RIDGE;
 
-/// The factors of the matrix M = L D L^T, column by column, and those of the splines. Columns follow the fringes. Without them, streaks of phase and colour
-/// along a fringe converge slowly. Within a cell, the albedos answer to phase and contrast, and the contrast to the phase.
+/// The factors of the matrix M = L D L^T, column by column, and those of the splines (J46). Columns follow the fringes. Without them,
+/// streaks of phase and colour along a fringe converge slowly. Within a cell, the albedos answer to phase and contrast, and the contrast
+/// to the phase.
 #[derive(Debug, Default)]
 pub(super) struct Preconditioner {
     /// Change of each logarithm of an albedo that balances a unit change of the phase or the contrast of its cell, negative.

@@ -1,4 +1,4 @@
-//! The second part of the preconditioner: slow changes of the phase across columns, which the columns alone find only one by one.
+//! The second part of the preconditioner: slow changes of the phase across many columns.
 //!
 //! The phase of a tile is written as a tensor product of quadratic B-splines with a knot at every vector of cells. The matrix of the
 //! step, restricted to them, is banded, small, and factored exactly (J46).
@@ -130,12 +130,13 @@ impl Splines {
         }
     }
 
-    /// Factors the matrix.
+    /// Factors the matrix. Its diagonal is raised by more than rounding can take from a pivot.
     #[inline(always)]
     pub fn factor(&mut self) {
+        self.upper[..COUNT].iter_mut().for_each(|row| row[0] *= f64::from(1.0 + PIVOT_RIDGE));
         for k in 0..COUNT {
             let (head, below) = self.upper[k..].split_first_mut().expect("the row exists");
-            let inverse = 1.0 / (head[0] * f64::from(1.0 + PIVOT_RIDGE)).sqrt();
+            let inverse = 1.0 / head[0].sqrt();
             head.iter_mut().for_each(|entry| *entry *= inverse);
             for (i, row) in (1..).zip(&mut below[..REACH]) {
                 for (entry, along) in row.iter_mut().zip(&head[i..]) {
