@@ -204,8 +204,8 @@ pub(super) const CERTAIN_SDS: f64 = 4.0;
 pub(super) const HARMONIC_LEAST: f64 = 0.035;
 
 /// Second harmonic over the first that no texture has in the median of the tiles, so that the light is not linear however uncertain the
-/// exponent is: a few tiles with a wrong phase, as at depth steps, may leave exponent and offset to each other. Smaller: texture counts as
-/// a response. Larger: strong responses are left uncorrected (`cargo test --package quadfringe --test response`).
+/// exponent is: a few tiles with a wrong phase, as at depth steps, make its standard error large. Smaller: texture counts as a response.
+/// Larger: strong responses are left uncorrected (`cargo test --package quadfringe --test response`, `python evaluation/response_sd.py`).
 pub(super) const HARMONIC_SURE: f64 = 0.15;
 
 /// Standard error that all tiles have in common, as a share of the distance of the exponent from 1. Noise that black

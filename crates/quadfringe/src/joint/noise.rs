@@ -166,30 +166,34 @@ fn median(mut values: Vec<f32>) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_pcg::{Pcg64Mcg, rand_core::SeedableRng};
 
-    /// A number in [-1, 1] for each seed and place.
-    fn random(seed: usize, at: usize) -> f32 {
-        let mut state = (seed * 7919 + at).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-        state ^= state >> 29;
-        state = state.wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        (state >> 40) as f32 / (1u32 << 23) as f32 - 1.0
+    fn normal(seed: u64, count: usize) -> Vec<f32> {
+        let mut random = Pcg64Mcg::seed_from_u64(seed);
+        (0..count).map(|_| StandardNormal.sample(&mut random)).collect()
     }
+
+    const NOISE: f32 = 0.02;
 
     #[test]
     fn texture_that_two_channels_share_is_no_noise() {
         let grid = Grid::new([256, 256], 8.0);
-        let plane = |noise: f32, texture: f32, seed: usize| -> Vec<f32> {
-            (0..grid.pixels()).map(|at| 0.5 + texture * random(9, at) + noise * random(seed, at)).collect()
-        };
-        // Uniform noise in [-a, a] has the standard deviation a / sqrt 3.
-        let expected = 0.03 / 3f32.sqrt();
-        let noise = |texture: f32| {
-            let [red, green] = [1, 2].map(|seed| plane(0.03, texture, seed));
+        let shared = normal(9, grid.pixels());
+        let found = |texture: f32| {
+            let [red, green] = [1, 2].map(|seed| -> Vec<f32> {
+                let noise = normal(seed, grid.pixels());
+                noise
+                    .iter()
+                    .zip(&shared)
+                    .map(|(noise, shared)| 0.5 + NOISE * noise + texture * shared)
+                    .collect()
+            });
             [noise_of_image(&red, &grid), noise_of_difference([&red, &green], &grid)]
         };
-        let [alone, difference] = noise(0.0);
-        assert!((alone / expected - 1.0).abs() < 0.05 && (difference / expected - 1.0).abs() < 0.05);
-        let [alone, difference] = noise(0.04);
-        assert!(alone > 1.5 * expected && (difference / expected - 1.0).abs() < 0.05, "{alone} {difference}");
+        let [alone, difference] = found(0.0);
+        assert!((alone / NOISE - 1.0).abs() < 0.05 && (difference / NOISE - 1.0).abs() < 0.05);
+        let [alone, difference] = found(1.5 * NOISE);
+        assert!(alone > 1.5 * NOISE && (difference / NOISE - 1.0).abs() < 0.05, "{alone} {difference}");
     }
 }

@@ -78,7 +78,7 @@ def waves_of(pair: Pair, difference_px: Map) -> Waves:
         part = _confirmed(maker, family, values - explained)
         words = _gamma_words if family.name == "gamma" else _crosstalk_words
         share = share_explained(values, part, values - explained)
-        if number and share < params.WAVES_MORE:
+        if share < params.WAVES_MORE:
             break
         found.append(Explanation(family.name, words(sign * family.sizes, family), share, family.size))
         explained = explained + part
@@ -121,7 +121,8 @@ def _fringes_left(shape: Shape, plan: Plan, known: Mask) -> float:
     found = [0.0]
     for channel, number in enumerate(plan.fringes.channel_numbers):
         light = shape.albedo[..., channel][known].astype(np.float64)
-        if (seen := np.isfinite(light)).any():
+        seen = np.isfinite(light)
+        if light[seen].any():  # 0 everywhere: a channel without light
             relative = light[seen] / light[seen].mean() - 1
             found.append(2 * abs(np.mean(relative * np.exp(1j * number * turns[seen]))))
     return float(max(found))

@@ -86,8 +86,9 @@ pub fn estimate_response_of_shot(
 /// One projector and one camera usually have the same response in all channels, and four times as many tiles make a more
 /// stable estimate.
 ///
-/// A correction that turns the sign of the second harmonic is taken back to where it vanishes. Light stays linear unless the exponent
-/// differs from 1 by several standard errors, or the second harmonic is larger than that of any texture, and the second harmonic shrinks.
+/// A correction that turns the sign of the second harmonic is taken back to where it vanishes. Light stays linear unless the correction makes
+/// the second harmonic smaller, and either the exponent differs from 1 by several standard errors or the harmonic is larger than that of
+/// any texture.
 fn of_channel(traces: &[Trace<'_>], shared: &Shared) -> Option<ResponseEstimate> {
     if traces.len() < CHANNEL_TILES_MIN {
         return None;

@@ -88,7 +88,8 @@ pub const OUTER_STEPS: usize = 8;
 /// time. One leaves the median of the coin 14 % larger with half the detail; six change no RMS by more than 4 %.
 /// `python evaluation/world.py --half tune --detail 0.5`.
 pub const DETAIL_STEPS: usize = 2;
-/// Greatest number of steps of conjugate gradients in a linear system. More: time where one converges slowly. Fewer: it is not solved. `python evaluation/sensitivity.py --only energy::INNER_STEPS`.
+/// Greatest number of steps of conjugate gradients in a linear system. More: time where one converges slowly. Fewer: it is not solved.
+/// `python evaluation/sensitivity.py --only energy::INNER_STEPS`.
 pub const INNER_STEPS: usize = 60;
 /// Share of the squared residual, in the norm of the preconditioner, at which conjugate gradients end. Larger: long ripples of the start
 /// stay on painted surfaces, which are a small share of this residual. Smaller: time.
