@@ -4,7 +4,7 @@ use super::plane::{Derivatives, Plane, STRIDE, Weights, row, total};
 use super::scales::Information;
 use crate::joint::model::{count, weights as channel_weights};
 use crate::joint::params::energy::{CONTRAST_RIDGE, RIDGE, SIDE};
-use crate::parallel::lanes::{LANES, Lanes, add};
+use crate::parallel::lanes::{LANES, Lanes, add, times};
 use multiversion::multiversion;
 
 /// Diagonal of the matrix of bending.
@@ -22,6 +22,13 @@ pub(super) fn bend_diagonal(weights: &Weights, at: usize) -> Lanes {
         }
     }
     out
+}
+
+/// Weight of the bending that holds a cell: that of its differences in the middle of a uniform surface, where their diagonal is 20 times it,
+/// and less at a border, where fewer differences reach the cell.
+#[inline(always)]
+pub(super) fn bend_stiffness(weights: &Weights, at: usize) -> Lanes {
+    times([1.0 / 20.0; LANES], bend_diagonal(weights, at))
 }
 
 /// Sum of the four weights of first differences at a cell.

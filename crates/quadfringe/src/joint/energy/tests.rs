@@ -1,5 +1,6 @@
 //! The matrix of a step, the minimum of one tile, and the seams between tiles.
 
+use super::blocks::bend_stiffness;
 use super::cell_px;
 use super::plane::{Column, Derivatives, Fields, Plane, Weights, place, total, vectors};
 use super::preconditioner::{Preconditioner, move_along, prepare, turn};
@@ -10,6 +11,7 @@ use super::solve::multiply;
 use super::tile::Tile;
 use super::value::{Given, add_energy};
 use crate::joint::params::energy::SIDE;
+use crate::parallel::lanes::LANES;
 
 pub(super) const RATIOS: [f32; 4] = [1.0, 35.0 / 36.0, 1.0, 30.0 / 36.0];
 
@@ -217,6 +219,23 @@ fn the_matrix_is_symmetric_and_positive() {
     multiply::<true>(derivatives, weights, inside, RATIOS, &second, &mut two);
     let (forth, back) = (scalar(&second, &one), scalar(&first, &two));
     assert!((forth - back).abs() < 1e-4 * own, "{forth} {back} {own}");
+}
+
+#[test]
+fn a_border_holds_a_cell_less_than_the_middle_but_holds_it() {
+    let (mut tile, _) = tile(0.0);
+    tile.inside.clear();
+    (20..60).for_each(|y| tile.inside.row_mut(y)[20..60].fill(1.0));
+    tile.unknown.phase.clear();
+    weigh(&mut tile);
+    let Tile { weights, .. } = &tile;
+    let [middle, side, corner] = [(40, 40), (20, 40), (20, 20)].map(|(x, y)| {
+        let at = place(x - x % LANES, y);
+        bend_stiffness(weights, at)[x % LANES]
+    });
+    let weight = weights.bend[0].row(40)[40];
+    assert!((middle / weight - 1.0).abs() < 1e-5 && weights.bend[0].row(40)[20] == 0.0);
+    assert!(0.0 < corner && corner < side && side < middle, "{corner} {side} {middle}");
 }
 
 #[test]

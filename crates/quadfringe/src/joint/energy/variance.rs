@@ -1,7 +1,7 @@
 //! Variance of the phase at the minimum (U13), (U14), (U17), (U18), (U19).
 
 use super::bias::{Minimum, Work, bias};
-use super::blocks::phase_information;
+use super::blocks::{bend_stiffness, phase_information};
 use super::disagreement::disagreement;
 use super::plane::{Fields, Plane, vectors};
 use super::scales::variance_share;
@@ -13,7 +13,7 @@ use crate::joint::params::uncertainty::{
 use crate::parallel::lanes::LANES;
 use multiversion::multiversion;
 
-/// Writes the variance of the phase of every cell, rad^2; `noise` is that of the intensity of a cell. Changes the product.
+/// Writes the variance of the phase of every cell, rad^2; `noise` is that of the intensity of a cell. Changes the product and the direction.
 pub(super) fn variance(tile: &mut Tile, noise: f32, out: &mut Plane) {
     disagreement(tile, out);
     add_variance(tile, noise, out);
@@ -27,23 +27,12 @@ fn correction_left(tile: &Tile) -> f32 {
 /// Adds the variance by noise, by the residuals, by the correction, by the bias and by other minima.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn add_variance(tile: &mut Tile, noise: f32, out: &mut Plane) {
-    let left = correction_left(tile);
-    let Tile {
-        inside, start, unknown, scales, derivatives, weights, product, residual, ratios, spread, ..
-    } = tile;
+    gather(tile);
+    let Tile { inside, scales, weights, product, residual, direction, .. } = tile;
     let Fields { phase: information, contrast: spare, albedo: [corrections, pull, known, biases] } = product;
-    for at in vectors() {
-        information.set(at, phase_information(derivatives, weights, *ratios, at));
-        let (phase, start, lit) = (unknown.phase.get(at), start.get(at), inside.get(at));
-        let mut square = spread.get(at);
-        for x in 0..LANES {
-            square[x] = lit[x] * (square[x] + left * (phase[x] - start[x]) * (phase[x] - start[x]));
-        }
-        corrections.set(at, square);
-    }
     let work = Work { pull, known, spare: &mut *spare };
     let minimum =
-        Minimum { gradient: &residual.phase, information, bend: &weights.bend[0], noise: scales.misfit };
+        Minimum { gradient: &residual.phase, information, bend: &direction.phase, noise: scales.misfit };
     bias(&minimum, work, biases);
     // A saturated cell has no information by itself; its neighbours determine it.
     smooth(information, spare);
@@ -58,6 +47,25 @@ fn add_variance(tile: &mut Tile, noise: f32, out: &mut Plane) {
             variance[x] += by_noise + excess / known + square[x] + biased[x];
         }
         out.set(at, variance);
+    }
+}
+
+/// Writes information and squared corrections of the cells into the product, and the weights of the bending that hold them into the
+/// direction.
+#[inline(always)]
+fn gather(tile: &mut Tile) {
+    let left = correction_left(tile);
+    let Tile { inside, start, unknown, derivatives, weights, product, direction, ratios, spread, .. } = tile;
+    let Fields { phase: information, albedo: [corrections, ..], .. } = product;
+    for at in vectors() {
+        information.set(at, phase_information(derivatives, weights, *ratios, at));
+        direction.phase.set(at, bend_stiffness(weights, at));
+        let (phase, start, lit) = (unknown.phase.get(at), start.get(at), inside.get(at));
+        let mut square = spread.get(at);
+        for x in 0..LANES {
+            square[x] = lit[x] * (square[x] + left * (phase[x] - start[x]) * (phase[x] - start[x]));
+        }
+        corrections.set(at, square);
     }
 }
 
