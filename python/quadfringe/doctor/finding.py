@@ -17,7 +17,8 @@ Grade = Literal["good", "note", "warning", "fault"]
 class Finding:
     """The result of one check: its name, grade, what was found, and the fix, which is empty for a good grade.
 
-    A note says what the shot cannot show, or not before another fault is mended, and what to do. It is no sign of a fault.
+    A note says what the shot cannot show, or not before another fault is mended, and what to do. It is no sign of a
+    fault.
     """
 
     name: str
