@@ -1,22 +1,24 @@
 """Tell sound shots of small objects from broken ones: how many of either are refused, and what the others return.
 
-    python evaluation/soundness.py [--seeds N ...] [--only FAULT ...] [--offsets]
+    python evaluation/soundness.py [--texture NAME] [--seeds N ...] [--only FAULT ...] [--offsets]
 
-Objects on black fill 2 and 6 % of the frame and are one to six fringes wide. A shot is sound, is harmed by a wrong
-response, blur or crosstalk, or is broken: two channels are exchanged, or all of them; the same image is given twice;
-infrared is moved by 4 to 20 px; the fringe numbers are others than it is decoded with; noise is in place of fringes. A
-shot is returned wrong if more than 2 % of its returned pixels have a wrong order. With --offsets the quartiles of the
-offsets of green and infrared from the phase, and of their scatter, are printed for shots below the sure margin: for
-sound and harmed shots whose orders are right, and for broken ones whose orders are wrong.
+Objects on black fill 2 and 6 % of the frame and are one to six fringes wide; those with a texture fill 4 to 12 %. A
+shot is sound, is harmed by a wrong response, blur or crosstalk, or is broken: two channels are exchanged, or all of
+them; the same image is given twice; infrared is moved by 4 to 20 px; the fringe numbers are others than it is decoded
+with; noise is in place of fringes. A shot is returned wrong if more than 2 % of its returned pixels have a wrong order.
+With --offsets the quartiles of the offsets of green and infrared from the phase, and of their scatter, are printed for
+shots below the sure margin: for sound and harmed shots whose orders are right, and for broken ones whose orders are
+wrong.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from statistics import fmean
 
 import numpy as np
+from numpy.typing import NDArray
 
 import quadfringe as qf
 from quadfringe.decoding.agreement import Agreement
@@ -26,22 +28,33 @@ from quadfringe.errors import DecodeError
 from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import scoring
 from quadfringe.evaluation._faults import BROKEN, HARMED, SOUND
-from quadfringe.evaluation._isolated import isolated
+from quadfringe.evaluation._isolated import isolated, patches
 from quadfringe.evaluation.scoring import Scene
+from quadfringe.evaluation.world.albedo import photographs
 
 SURFACES = ("steps", "face", "sphere", "peaks")
 # Fringe period in px, share of the frame.
 OBJECTS = ((33, 0.02), (74, 0.02), (110, 0.02), (110, 0.06))
+# The same with an albedo of strong colours, as (H, W, 4) from a seed; its fringes have nearly full contrast.
+TEXTURED, TEXTURED_CONTRAST = ((33, 0.04), (50, 0.08), (74, 0.12)), 0.8
+TEXTURES: dict[str, Callable[[int], NDArray[np.float32]]] = {
+    "photographs": lambda seed: photographs((768, 1024), np.random.default_rng([seed, 3])),
+    "patches": lambda seed: patches(30, seed),
+}
 RIGHT_MIN_PERCENT = 98.0
 FAULTS = SOUND | HARMED | BROKEN
 QUARTILES = (0, 0.25, 0.5, 0.75, 1)
 
 
-def objects(seeds: list[int]) -> Iterator[Scene]:
+def objects(seeds: list[int], texture: str | None) -> Iterator[Scene]:
     for surface in SURFACES:
-        for period_px, share in OBJECTS:
+        for period_px, share in TEXTURED if texture else OBJECTS:
             for seed in seeds:
-                yield isolated(period_px, share, seed, surface=surface)
+                if texture:
+                    albedo, contrast = TEXTURES[texture](seed), TEXTURED_CONTRAST
+                    yield isolated(period_px, share, seed, surface=surface, albedo=albedo, contrast=contrast)
+                else:
+                    yield isolated(period_px, share, seed, surface=surface)
 
 
 def judged(scene: Scene) -> scoring.Score | None:
@@ -74,10 +87,11 @@ def main() -> None:
     parser.add_argument("--seeds", nargs="+", type=int, metavar="N", default=[71, 72])
     parser.add_argument("--only", nargs="+", choices=list(FAULTS), default=list(FAULTS))
     parser.add_argument("--offsets", action="store_true", help="print the offsets that the limits of the verdict hold")
+    parser.add_argument("--texture", choices=list(TEXTURES), help="print strong colours on the objects, larger ones")
     options = parser.parse_args()
     print(f"{'':16}{'shots':>7}{'refused':>9}{'wrong':>7}{'right, %':>10}")
     for fault in options.only:
-        shots = [FAULTS[fault](scene) for scene in objects(options.seeds)]
+        shots = [FAULTS[fault](scene) for scene in objects(options.seeds, options.texture)]
         scores = [score for score in map(judged, shots) if score is not None]
         wrong = sum(score.right_of_returned_percent < RIGHT_MIN_PERCENT for score in scores)
         right = fmean(score.right_percent for score in scores) if scores else np.nan

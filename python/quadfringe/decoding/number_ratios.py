@@ -20,6 +20,7 @@ __all__ = [
     "FringeNumbers",
     "agree",
     "channels_fit",
+    "families",
     "family",
     "listed",
     "measured",
@@ -59,7 +60,7 @@ def wrong_numbers(plan: Plan, closure: Closure | None) -> Cause | None:
     if not params.RATIO_OFF < closure.off < params.RATIO_STRANGE:
         return None
     given = _misfit(plan.fringes.numbers, plan, closure, limits.RATIO_SD)
-    best = min((_misfit(numbers, plan, closure, limits.RATIO_SD) for numbers in _families(plan)), default=np.inf)
+    best = min((_misfit(numbers, plan, closure, limits.RATIO_SD) for numbers in families(plan)), default=np.inf)
     if given < min(best + limits.LIKELIER, limits.OFF_THE_PLAN):
         return None
     proposed = _proposed(plan, closure)
@@ -81,7 +82,7 @@ def measured(plan: Plan, closure: Closure) -> str:
 
 def _proposed(plan: Plan, closure: Closure) -> FringeNumbers | None:
     """Give the family of numbers that both ratios fit within their errors, if all others are far less likely."""
-    misfits = sorted((_misfit(one, plan, closure, limits.EXACT_SD), one) for one in _families(plan))
+    misfits = sorted((_misfit(one, plan, closure, limits.EXACT_SD), one) for one in families(plan))
     if not misfits or not agree(misfits[0][1], plan, closure):
         return None
     clear = len(misfits) == 1 or misfits[1][0] > misfits[0][0] + limits.LIKELIER
@@ -101,7 +102,7 @@ def _misses(numbers: FringeNumbers, plan: Plan, closure: Closure, floor: float) 
     return [(ratio - one) / float(np.hypot(error, floor)) for ratio, one, error in pairs]
 
 
-def _families(plan: Plan) -> list[FringeNumbers]:
+def families(plan: Plan) -> list[FringeNumbers]:
     """Give the families of three numbers, without that of the plan; none for two numbers."""
     if len(plan.fringes.numbers) < 3:
         return []
@@ -121,7 +122,7 @@ def other_numbers(plan: Plan, closure: Closure) -> list[FringeNumbers]:
         return [numbers for numbers in pairs if numbers != plan.fringes.numbers and _covers(numbers, plan)]
     root = 1 / max(1 - closure.infrared * others[0] / first, 1e-3)
     near = [family(whole) for whole in {int(root), int(root) + 1}]
-    return [numbers for numbers in _families(plan) if numbers in near and _covers(numbers, plan)]
+    return [numbers for numbers in families(plan) if numbers in near and _covers(numbers, plan)]
 
 
 def family(root: int) -> FringeNumbers:

@@ -23,6 +23,7 @@ from quadfringe.decoding.number_ratios import NUMBERS_FIX, agree, channels_fit, 
 from quadfringe.decoding.plan import Plan
 from quadfringe.decoding.plausibility import mirrored
 from quadfringe.decoding.readings import Reading, band_of, other_readings, rows_of
+from quadfringe.decoding.rivals import outdoes_rivals
 from quadfringe.decoding.symptoms import saturation
 from quadfringe.decoding.trusted import is_scattered, take_out, trusted_part
 from quadfringe.errors import DecodeError
@@ -34,7 +35,9 @@ CHECK_ALL = (
     "width and the response are those of this shot"
 )
 # Reasons that may hold for a part of a shot. Others, as wrong fringe numbers or crosstalk, hold for all of it.
-IN_PART = (ORDERS, "infrared registration", "infrared projector", "saturation", "no fringes")
+IN_PART = (ORDERS, "infrared registration", "infrared projector", "saturation", "no fringes", "brightness")
+# Reasons that do not hold if all other readings explain the light less.
+OUTDONE = (ORDERS, "infrared registration", "infrared projector", "brightness", "crosstalk", "response", "blur")
 
 
 def judge(shape: Shape, shot: AnyShot, decoder: KernelDecoder | None) -> Cause | None:
@@ -44,16 +47,21 @@ def judge(shape: Shape, shot: AnyShot, decoder: KernelDecoder | None) -> Cause |
     other Bayer pattern, to name them; with None these and all further tests are left out. A shot of any margin, as of a
     photograph or of an object as narrow as a fringe, is kept if its channels agree on the phase. A shot below the sure
     margin is refused if they contradict it.
-    If a part can be trusted, the rest becomes no data, in place, and its likely cause is given.
+    If a part can be trusted, the rest becomes no data, in place, and its likely cause is given. All is kept where no
+    other reading explains the light nearly as well, with a cause that has a name.
     """
     try:
         _refuse_whole(shape, shot, decoder)
     except DecodeError as refused:
         part = None if decoder is None or refused.reason not in IN_PART else trusted_part(shape, shot, decoder.plan)
+        # Orders of quality 0, which the decoder has taken out, belong to the shot as a whole too.
+        whole = limits.KEPT_MIN * np.count_nonzero(shape.returned | (shape.quality == 0))
+        few = part is None or np.count_nonzero(part) < whole
+        if few and decoder is not None and refused.reason in OUTDONE and outdoes_rivals(shape, shot, decoder):
+            words = "no other reading of the shot explains its light nearly as well, so it is kept, although"
+            return Cause.doubt(refused, words) if refused.reason != ORDERS else None
         if part is None:
             raise
-        # Orders of quality 0, which the decoder has taken out, belong to the shot as a whole too.
-        few = np.count_nonzero(part) < limits.KEPT_MIN * np.count_nonzero(shape.returned | (shape.quality == 0))
         take_out(shape, shape.returned & ~part)
         words = f"only {part.mean():.0%} of the image can be trusted, and the rest is no data; of the shot as a whole"
         return Cause.doubt(refused, words) if few else None

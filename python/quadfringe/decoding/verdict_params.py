@@ -27,6 +27,13 @@ DOUBTFUL = 0.6
 SURE = 0.75
 NUMBERS_SURE = {"joint": SURE, "published": DOUBTFUL}
 CLEARLY_BETTER = 1.2  # ratio of margins from which channels count as exchanged, or fringe numbers as others
+# Share of the lit pixels that must be returned for a shot to be compared with its other readings. Of objects with
+# photographs as albedo, sound ones have 0.5 to 0.98 and broken ones 0 to 0.9. A larger share refuses printed objects, a
+# smaller one takes time for shots that are refused anyway: `python evaluation/soundness.py --texture photographs`.
+STANDING_MIN = 0.5
+# Parts of a fringe of infrared by which it is shifted for such readings. With fewer, a shift lies between two of them
+# and both explain little; more take time. The nearest one is off by a sixteenth, which changes no order.
+SHIFTS_OF_A_FRINGE = 8
 # Without infrared the frequency of green tells exchanged channels: sound shots are off by at most 0.002, white or with
 # coloured patches, exchanged channels by 0.08 or more (`pytest tests/test_rgb.py`). Neighbouring fringe numbers are off
 # by less than this.

@@ -28,7 +28,6 @@ FIXED = {
     "albedo::CANDIDATES",
     "albedo::ROWS",
     "energy::SIDE",
-    "illumination::NOISE_STEPS",
     "local_fit::CARRIER_WINDOWS",
     "pyramid::FACTOR_MAX",
     "regions::SHIFTS",

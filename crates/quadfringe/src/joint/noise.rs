@@ -3,10 +3,11 @@
 use super::cells::Grid;
 use super::model::{count, weights};
 use super::params::illumination::{
-    MODULATION_FLOOR, MODULATION_NOISES, NOISE_GROUPS, NOISE_LIMITS, NOISE_SAMPLES, NOISE_STEPS,
+    MODULATION_FLOOR, MODULATION_NOISES, NOISE_GROUPS, NOISE_LIMITS, NOISE_SAMPLES,
 };
 use super::scene::{PhaseMap, Scene};
 use crate::parallel::angle::wrap;
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 /// Median of the absolute value of a normal deviation, in standard deviations.
@@ -38,18 +39,20 @@ pub(super) struct NoiseByLight {
     weights: [f32; 4],
 }
 
-/// Relative variance of the noise at `NOISE_STEPS` values of the light.
-#[derive(Debug)]
+/// Relative variance of the noise by the light, in straight pieces, and constant beyond them.
+#[derive(Debug, Default)]
 struct Curve {
-    variance: [f32; NOISE_STEPS],
-    /// Steps in a unit of light.
-    scale: f32,
+    /// Variance of the darkest light.
+    dark: f32,
+    pieces: Vec<Piece>,
 }
 
-impl Default for Curve {
-    fn default() -> Self {
-        Self { variance: [1.0; NOISE_STEPS], scale: 1.0 }
-    }
+#[derive(Debug)]
+struct Piece {
+    /// Light at which it begins.
+    from: f32,
+    /// Its slope less that of the one before.
+    turn: f32,
 }
 
 impl NoiseByLight {
@@ -66,9 +69,7 @@ impl NoiseByLight {
         out.clear();
         out.resize(light[0].len(), 0.0);
         for ((curve, weight), light) in self.channels.iter().zip(self.weights).zip(light) {
-            for (out, light) in out.iter_mut().zip(light) {
-                *out += weight * curve.at(*light);
-            }
+            curve.add(weight, light, out);
         }
     }
 }
@@ -78,30 +79,50 @@ impl Curve {
     fn of(plane: &[f32], grid: &Grid, whole: f32) -> Self {
         let mut seen: Vec<Seen> = bends(|at| plane[at], grid, NOISE_SAMPLES / 4).collect();
         if seen.len() < NOISE_GROUPS || whole <= 0.0 {
-            return Self::default();
+            return Self::through([[0.0, 1.0]].into_iter());
         }
         seen.sort_unstable_by(|a, b| a.light.total_cmp(&b.light));
         let groups = seen.chunks(seen.len().div_ceil(NOISE_GROUPS)).map(|group| {
             let noise = deviation(group.iter().map(|seen| seen.bend).collect());
             [group[group.len() / 2].light, (noise * noise / whole).clamp(NOISE_LIMITS[0], NOISE_LIMITS[1])]
         });
-        let groups: Vec<[f32; 2]> = groups.collect();
-        let scale = (NOISE_STEPS - 1) as f32 / groups[groups.len() - 1][0].max(1e-6);
-        Self { variance: std::array::from_fn(|step| between(&groups, step as f32 / scale)), scale }
+        Self::through(groups)
     }
 
-    #[inline(always)]
-    fn at(&self, light: f32) -> f32 {
-        self.variance[((light * self.scale) as usize).min(NOISE_STEPS - 1)]
+    /// Straight pieces through groups, as light and variance. Groups with the same light, but for rounding, count as the last one.
+    fn through(groups: impl Iterator<Item = [f32; 2]>) -> Self {
+        let mut distinct: Vec<[f32; 2]> = Vec::with_capacity(NOISE_GROUPS);
+        for group in groups {
+            if distinct.last().is_some_and(|last| group[0] - last[0] < MODULATION_FLOOR) {
+                distinct.pop();
+            }
+            distinct.push(group);
+        }
+        let slopes = distinct.windows(2).map(|pair| (pair[1][1] - pair[0][1]) / (pair[1][0] - pair[0][0]));
+        let mut before = 0.0;
+        let pieces = distinct.iter().zip(slopes.chain([0.0])).map(|([from, _], slope)| {
+            let turn = slope - before;
+            before = slope;
+            Piece { from: *from, turn }
+        });
+        Self { pieces: pieces.collect(), dark: distinct[0][1] }
+    }
+
+    /// Adds the variance, times a weight, for the light of each pixel of a row.
+    fn add(&self, weight: f32, light: &[f32], out: &mut [f32]) {
+        out.iter_mut().for_each(|out| *out += weight * self.dark);
+        for Piece { from, turn } in &self.pieces {
+            add_line(*from, weight * turn, light, out);
+        }
     }
 }
 
-/// Linear interpolation between groups, as light and variance; constant beyond them.
-fn between(groups: &[[f32; 2]], light: f32) -> f32 {
-    let after = groups.partition_point(|[at, _]| *at <= light);
-    let ([from, a], [to, b]) = (groups[after.max(1) - 1], groups[after.min(groups.len() - 1)]);
-    let share = if to > from { ((light - from) / (to - from)).clamp(0.0, 1.0) } else { 0.0 };
-    a + share * (b - a)
+/// Adds a line that rises by `turn` from the light `from` on.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn add_line(from: f32, turn: f32, light: &[f32], out: &mut [f32]) {
+    for (out, light) in out.iter_mut().zip(light) {
+        *out += turn * (light - from).max(0.0);
+    }
 }
 
 /// What is seen around a pixel.
@@ -195,5 +216,17 @@ mod tests {
         assert!((alone / NOISE - 1.0).abs() < 0.05 && (difference / NOISE - 1.0).abs() < 0.05);
         let [alone, difference] = found(1.5 * NOISE);
         assert!(alone > 1.5 * NOISE && (difference / NOISE - 1.0).abs() < 0.05, "{alone} {difference}");
+    }
+
+    #[test]
+    fn variance_is_interpolated_between_groups_and_constant_beyond() {
+        let curve = Curve::through([[0.0, 9.0], [0.001, 1.0], [0.2, 3.0], [0.5, 2.0]].into_iter());
+        let mut found = vec![0.0; 6];
+        curve.add(0.5, &[-0.1, 0.0, 0.1005, 0.2, 0.35, 0.9], &mut found);
+        let expected = [0.5, 0.5, 1.0, 1.5, 1.25, 1.0];
+        assert!(
+            found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-5),
+            "{found:?}"
+        );
     }
 }

@@ -20,7 +20,7 @@ pub const CORE_SHARE: f32 = 0.6;
 /// shadows counts as light (with 0.5, 6 instead of 5 % of what only one projector of a pair lights is no shadow). From 0.33 to 1
 /// nothing else changes by more than 0.2 % of the pixels: `python evaluation/dark.py`, `pytest tests/test_pair_joint.py -rP`.
 pub const MODULATION_NOISES: f32 = 0.67;
-/// Least modulation that counts as light when there is no noise, as a fraction of full scale. Follows from the
+/// Least modulation that counts as light when there is no noise, and least difference of light, as a fraction of full scale. Follows from the
 /// rounding of 8 bits, which hides half a step. Larger: dark surfaces of cameras with more bits are lost. Smaller: noise that is
 /// clipped at black counts as light (with 0.001 a small object on black loses 9 % of its pixels): `pytest tests/test_real_objects.py -rP`.
 pub const MODULATION_FLOOR: f32 = 0.5 / 255.0;
@@ -32,9 +32,6 @@ pub const NOISE_SAMPLES: usize = 1 << 14;
 /// Groups of pixels with similar light, in each of which the noise of a channel is estimated. More: each estimate is less certain
 /// (5 % with 8 groups). Fewer: less of the difference between dark and bright pixels is seen. `python evaluation/captures.py`.
 pub const NOISE_GROUPS: usize = 8;
-/// Steps of light between 0 and the brightest group at which the noise is tabulated. More: nothing is gained. Fewer: the noise jumps
-/// from step to step. Not measured: it was set with `NOISE_GROUPS`.
-pub const NOISE_STEPS: usize = 64;
 /// Bounds of the variance of the noise of a group, relative to that of the whole red image. They matter where light is clipped, at
 /// black or by the response. `python evaluation/captures.py`.
 pub const NOISE_LIMITS: [f32; 2] = [0.25, 25.0];
