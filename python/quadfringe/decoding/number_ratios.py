@@ -20,6 +20,7 @@ __all__ = [
     "FringeNumbers",
     "agree",
     "channels_fit",
+    "covers",
     "families",
     "family",
     "listed",
@@ -119,10 +120,10 @@ def other_numbers(plan: Plan, closure: Closure) -> list[FringeNumbers]:
     if not others:
         whole = round(1 / max(1 - closure.green * second / first, 1e-3))
         pairs = [(float(n), float(n - 1)) for n in (whole - 1, whole, whole + 1) if SMALLEST_PAIR <= n <= LARGEST_PAIR]
-        return [numbers for numbers in pairs if numbers != plan.fringes.numbers and _covers(numbers, plan)]
+        return [numbers for numbers in pairs if numbers != plan.fringes.numbers and covers(numbers, plan)]
     root = 1 / max(1 - closure.infrared * others[0] / first, 1e-3)
     near = [family(whole) for whole in {int(root), int(root) + 1}]
-    return [numbers for numbers in families(plan) if numbers in near and _covers(numbers, plan)]
+    return [numbers for numbers in families(plan) if numbers in near and covers(numbers, plan)]
 
 
 def family(root: int) -> FringeNumbers:
@@ -130,7 +131,7 @@ def family(root: int) -> FringeNumbers:
     return float(root**2), float(root**2 - 1), float(root**2 - root)
 
 
-def _covers(numbers: FringeNumbers, plan: Plan) -> bool:
+def covers(numbers: FringeNumbers, plan: Plan) -> bool:
     """Say whether these numbers distinguish the columns of the projector."""
     try:
         _core.check_code(numbers, plan.projector_width_px, columns_px=plan.fringes.columns_px)

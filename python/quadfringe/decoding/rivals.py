@@ -18,7 +18,7 @@ from quadfringe.decoding import params
 from quadfringe.decoding import verdict_params as limits
 from quadfringe.decoding._kernel import KernelDecoder
 from quadfringe.decoding.column_direction import unusual_direction
-from quadfringe.decoding.number_ratios import families
+from quadfringe.decoding.number_ratios import covers, families
 from quadfringe.decoding.plan import Plan
 from quadfringe.decoding.plausibility import mirrored
 from quadfringe.decoding.readings import band_of, other_readings, rows_of
@@ -29,7 +29,7 @@ __all__ = ["outdoes_rivals"]
 def outdoes_rivals(shape: Shape, shot: AnyShot, decoder: KernelDecoder) -> bool:
     """Say whether most lit pixels are returned, fringes run forwards, and every other reading explains clearly less.
 
-    Only fringe numbers for red and blue, green and infrared allow the test.
+    Only fringe numbers for red and blue, green and infrared allow the test, and objects of a few fringes.
     """
     plan = decoder.plan
     if not (plan.fringes.infrared and plan.fringes.quadrature):
@@ -39,7 +39,7 @@ def outdoes_rivals(shape: Shape, shot: AnyShot, decoder: KernelDecoder) -> bool:
     first, count = band_of(shape)
     part, band = decoder.for_rows(first, count), rows_of(shot, first, count)
     given = part.shape(band)
-    if not _forwards(given):
+    if _fringes_across(given) < limits.STANDING_FRINGES_MIN or not _forwards(given):
         return False
     most = _explained(given) / limits.CLEARLY_BETTER
     return all(_explained(rival) < most or not _forwards(rival) for rival in _rivals(given, band, part))
@@ -74,11 +74,24 @@ def _differs(rival: Shape, given: Shape) -> bool:
     return bool(np.count_nonzero(off) > params.WARNED_SHARE * off.size)
 
 
+def _fringes_across(shape: Shape) -> float:
+    """Give the mean width of what is returned, in fringes; 0 if nothing is."""
+    rows = np.count_nonzero(shape.returned.any(axis=1))
+    return float(np.count_nonzero(shape.returned) / rows) / _period_px(shape) if rows else 0.0
+
+
+def _period_px(shape: Shape) -> float:
+    """Give the usual period along the rows, which is at most a row."""
+    slope = np.abs(np.diff(shape.phase_rad, axis=1))
+    known = slope[np.isfinite(slope)]
+    turn = float(np.median(known)) if known.size else 0.0
+    return min(2 * np.pi / max(turn, 1e-6), float(shape.returned.shape[1]))
+
+
 def _shifts_px(given: Shape, plan: Plan) -> list[int]:
     """Give the shifts of infrared that divide one of its fringes evenly."""
-    slope = np.abs(np.diff(given.phase_rad, axis=1))
     first, *_, third = plan.fringes.numbers
-    period_px = 2 * np.pi / float(np.nanmedian(slope)) * first / third
+    period_px = _period_px(given) * first / third
     parts = np.arange(1, limits.SHIFTS_OF_A_FRINGE) / limits.SHIFTS_OF_A_FRINGE
     return sorted({round(part * period_px) for part in parts} - {0})
 
@@ -86,4 +99,4 @@ def _shifts_px(given: Shape, plan: Plan) -> list[int]:
 def _other_numbers(plan: Plan) -> list[tuple[float, ...]]:
     """Give the families of fringe numbers, and all three numbers one larger or smaller than those of the plan."""
     next_to = [tuple(number + step for number in plan.fringes.numbers) for step in (-1, 1)]
-    return [*families(plan), *next_to]
+    return [numbers for numbers in (*families(plan), *next_to) if covers(numbers, plan)]

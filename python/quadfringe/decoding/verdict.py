@@ -35,7 +35,7 @@ CHECK_ALL = (
     "width and the response are those of this shot"
 )
 # Reasons that may hold for a part of a shot. Others, as wrong fringe numbers or crosstalk, hold for all of it.
-IN_PART = (ORDERS, "infrared registration", "infrared projector", "saturation", "no fringes", "brightness")
+IN_PART = (ORDERS, "infrared registration", "infrared projector", "saturation", "no fringes")
 # Reasons that do not hold if all other readings explain the light less.
 OUTDONE = (ORDERS, "infrared registration", "infrared projector", "brightness", "crosstalk", "response", "blur")
 

@@ -31,6 +31,9 @@ CLEARLY_BETTER = 1.2  # ratio of margins from which channels count as exchanged,
 # photographs as albedo, sound ones have 0.5 to 0.98 and broken ones 0 to 0.9. A larger share refuses printed objects, a
 # smaller one takes time for shots that are refused anyway: `python evaluation/soundness.py --texture photographs`.
 STANDING_MIN = 0.5
+# Mean width in fringes of what is returned, at least. A larger width refuses printed objects. Across one fringe, other
+# numbers that are not among these readings are returned: `pytest tests/test_soundness.py -k broken`.
+STANDING_FRINGES_MIN = 3.0
 # Parts of a fringe of infrared by which it is shifted for such readings. With fewer, a shift lies between two of them
 # and both explain little; more take time. The nearest one is off by a sixteenth, which changes no order.
 SHIFTS_OF_A_FRINGE = 8
