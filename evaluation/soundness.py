@@ -14,11 +14,10 @@ wrong.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from statistics import fmean
 
 import numpy as np
-from numpy.typing import NDArray
 
 import quadfringe as qf
 from quadfringe.decoding.agreement import Agreement
@@ -28,19 +27,13 @@ from quadfringe.errors import DecodeError
 from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import scoring
 from quadfringe.evaluation._faults import BROKEN, HARMED, SOUND
-from quadfringe.evaluation._isolated import isolated, patches
+from quadfringe.evaluation._isolated import isolated, printed
 from quadfringe.evaluation.scoring import Scene
-from quadfringe.evaluation.world.albedo import photographs
 
 SURFACES = ("steps", "face", "sphere", "peaks")
 # Fringe period in px, share of the frame.
 OBJECTS = ((33, 0.02), (74, 0.02), (110, 0.02), (110, 0.06))
-# The same with an albedo of strong colours, as (H, W, 4) from a seed; its fringes have nearly full contrast.
-TEXTURED, TEXTURED_CONTRAST = ((33, 0.04), (50, 0.08), (74, 0.12)), 0.8
-TEXTURES: dict[str, Callable[[int], NDArray[np.float32]]] = {
-    "photographs": lambda seed: photographs((768, 1024), np.random.default_rng([seed, 3])),
-    "patches": lambda seed: patches(30, seed),
-}
+PRINTED = ((33, 0.04), (50, 0.08), (74, 0.12))  # the same with strong colours
 RIGHT_MIN_PERCENT = 98.0
 FAULTS = SOUND | HARMED | BROKEN
 QUARTILES = (0, 0.25, 0.5, 0.75, 1)
@@ -48,11 +41,10 @@ QUARTILES = (0, 0.25, 0.5, 0.75, 1)
 
 def objects(seeds: list[int], texture: str | None) -> Iterator[Scene]:
     for surface in SURFACES:
-        for period_px, share in TEXTURED if texture else OBJECTS:
+        for period_px, share in PRINTED if texture else OBJECTS:
             for seed in seeds:
                 if texture:
-                    albedo, contrast = TEXTURES[texture](seed), TEXTURED_CONTRAST
-                    yield isolated(period_px, share, seed, surface=surface, albedo=albedo, contrast=contrast)
+                    yield printed(period_px, share, seed, surface=surface, texture=texture)
                 else:
                     yield isolated(period_px, share, seed, surface=surface)
 
@@ -87,7 +79,9 @@ def main() -> None:
     parser.add_argument("--seeds", nargs="+", type=int, metavar="N", default=[71, 72])
     parser.add_argument("--only", nargs="+", choices=list(FAULTS), default=list(FAULTS))
     parser.add_argument("--offsets", action="store_true", help="print the offsets that the limits of the verdict hold")
-    parser.add_argument("--texture", choices=list(TEXTURES), help="print strong colours on the objects, larger ones")
+    parser.add_argument(
+        "--texture", choices=("photographs", "patches"), help="print strong colours on the objects, larger ones"
+    )
     options = parser.parse_args()
     print(f"{'':16}{'shots':>7}{'refused':>9}{'wrong':>7}{'right, %':>10}")
     for fault in options.only:

@@ -13,8 +13,7 @@ from quadfringe.errors import DecodeError
 from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import scoring
 from quadfringe.evaluation._faults import BROKEN
-from quadfringe.evaluation._isolated import FRINGES, isolated
-from quadfringe.evaluation.world.albedo import photographs
+from quadfringe.evaluation._isolated import FRINGES, isolated, printed
 
 
 # Steps of less than a fringe: their order margins are low, and their channels agree.
@@ -49,17 +48,11 @@ def test_a_broken_shot_of_a_small_object_is_refused(surface: str, period_px: int
         qf.decode(shot, plan)
 
 
-def printed(period_px: int, share: float, seed: int, surface: str) -> scoring.Scene:
-    """An object with another photograph in every channel, which moves the fringes of each."""
-    albedo = photographs((768, 1024), np.random.default_rng([seed, 3]))
-    return isolated(period_px, share, seed, surface=surface, contrast=0.8, albedo=albedo)
-
-
 @pytest.mark.parametrize(("period_px", "share", "seed", "surface"), [(33, 0.04, 1, "peaks"), (50, 0.08, 2, "steps")])
 def test_a_printed_object_that_no_other_reading_explains_is_returned(
     period_px: int, share: float, seed: int, surface: str
 ) -> None:
-    scene = printed(period_px, share, seed, surface)
+    scene = printed(period_px, share, seed, surface=surface)
     shot, plan = scenes.plan_of(scene, response="linear")
     shape = qf.Decoder(shot, plan).decode_without_verdict(shot)
     assert Agreement(shape, shot, plan).contradicted
@@ -71,7 +64,7 @@ def test_a_printed_object_that_no_other_reading_explains_is_returned(
 @pytest.mark.parametrize("fault", ["ir by 8 px", "37, 36, 31", "64, 63, 56", "green and ir"])
 def test_a_broken_shot_of_a_printed_object_is_refused(fault: str) -> None:
     """Most of its lit pixels are returned without a verdict, with wrong orders."""
-    broken = BROKEN[fault](printed(33, 0.04, 4, "peaks"))
+    broken = BROKEN[fault](printed(33, 0.04, 4, surface="peaks"))
     shot, plan = scenes.plan_of(broken, response="linear")
     shape = qf.Decoder(shot, plan).decode_without_verdict(shot)
     assert np.count_nonzero(shape.returned) > STANDING_MIN * np.count_nonzero(np.isfinite(shape.quality))

@@ -22,6 +22,7 @@ from quadfringe.decoding.number_ratios import covers, families
 from quadfringe.decoding.plan import Plan
 from quadfringe.decoding.plausibility import mirrored
 from quadfringe.decoding.readings import band_of, other_readings, rows_of
+from quadfringe.decoding.trusted import mean_width_px
 
 __all__ = ["outdoes_rivals"]
 
@@ -39,7 +40,8 @@ def outdoes_rivals(shape: Shape, shot: AnyShot, decoder: KernelDecoder) -> bool:
     first, count = band_of(shape)
     part, band = decoder.for_rows(first, count), rows_of(shot, first, count)
     given = part.shape(band)
-    if _fringes_across(given) < limits.STANDING_FRINGES_MIN or not _forwards(given):
+    narrow = mean_width_px(given.returned) < limits.STANDING_FRINGES_MIN * _period_px(given)
+    if narrow or not _forwards(given):
         return False
     most = _explained(given) / limits.CLEARLY_BETTER
     return all(_explained(rival) < most or not _forwards(rival) for rival in _rivals(given, band, part))
@@ -72,12 +74,6 @@ def _differs(rival: Shape, given: Shape) -> bool:
     both = rival.returned & given.returned
     off = np.abs(rival.phase_rad[both] - given.phase_rad[both]) > np.pi
     return bool(np.count_nonzero(off) > params.WARNED_SHARE * off.size)
-
-
-def _fringes_across(shape: Shape) -> float:
-    """Give the mean width of what is returned, in fringes; 0 if nothing is."""
-    rows = np.count_nonzero(shape.returned.any(axis=1))
-    return float(np.count_nonzero(shape.returned) / rows) / _period_px(shape) if rows else 0.0
 
 
 def _period_px(shape: Shape) -> float:

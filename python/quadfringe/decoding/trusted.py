@@ -25,7 +25,7 @@ from quadfringe.decoding.plan import Plan
 from quadfringe.decoding.plausibility import BOUNDED
 from quadfringe.decoding.symptoms import linear_light_of
 
-__all__ = ["is_scattered", "take_out", "trusted_part"]
+__all__ = ["is_scattered", "mean_width_px", "take_out", "trusted_part"]
 
 Mask = NDArray[np.bool_]
 Map = NDArray[np.float32]
@@ -145,7 +145,12 @@ def _locally_fitting(waves: list[Complex], phase_rad: Map, plan: Plan) -> Mask:
 
 def _periods(region: Mask, closure: Closure) -> float:
     """Give the mean width of a region in infrared fringes."""
-    return float(region.sum() / np.count_nonzero(region.any(axis=1)) / closure.infrared_px)
+    return mean_width_px(region) / closure.infrared_px
+
+
+def mean_width_px(region: Mask) -> float:
+    """Give the mean width of a region in the rows that it has; 0 if it is empty."""
+    return float(region.sum() / max(np.count_nonzero(region.any(axis=1)), 1))
 
 
 def _whole(region: Mask, closure: Closure) -> bool:

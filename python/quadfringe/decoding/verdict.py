@@ -36,8 +36,6 @@ CHECK_ALL = (
 )
 # Reasons that may hold for a part of a shot. Others, as wrong fringe numbers or crosstalk, hold for all of it.
 IN_PART = (ORDERS, "infrared registration", "infrared projector", "saturation", "no fringes")
-# Reasons that do not hold if all other readings explain the light less.
-OUTDONE = (ORDERS, "infrared registration", "infrared projector", "brightness", "crosstalk", "response", "blur")
 
 
 def judge(shape: Shape, shot: AnyShot, decoder: KernelDecoder | None) -> Cause | None:
@@ -47,8 +45,8 @@ def judge(shape: Shape, shot: AnyShot, decoder: KernelDecoder | None) -> Cause |
     other Bayer pattern, to name them; with None these and all further tests are left out. A shot of any margin, as of a
     photograph or of an object as narrow as a fringe, is kept if its channels agree on the phase. A shot below the sure
     margin is refused if they contradict it.
-    If a part can be trusted, the rest becomes no data, in place, and its likely cause is given. All is kept where no
-    other reading explains the light nearly as well, with a cause that has a name.
+    If a part can be trusted, the rest becomes no data, in place, and its likely cause is given. All is kept where
+    doubtful orders have no other cause and no other reading explains the light nearly as well.
     """
     try:
         _refuse_whole(shape, shot, decoder)
@@ -57,9 +55,8 @@ def judge(shape: Shape, shot: AnyShot, decoder: KernelDecoder | None) -> Cause |
         # Orders of quality 0, which the decoder has taken out, belong to the shot as a whole too.
         whole = limits.KEPT_MIN * np.count_nonzero(shape.returned | (shape.quality == 0))
         few = part is None or np.count_nonzero(part) < whole
-        if few and decoder is not None and refused.reason in OUTDONE and outdoes_rivals(shape, shot, decoder):
-            words = "no other reading of the shot explains its light nearly as well, so it is kept, although"
-            return Cause.doubt(refused, words) if refused.reason != ORDERS else None
+        if few and decoder is not None and refused.reason == ORDERS and outdoes_rivals(shape, shot, decoder):
+            return None
         if part is None:
             raise
         take_out(shape, shape.returned & ~part)

@@ -27,9 +27,9 @@ DOUBTFUL = 0.6
 SURE = 0.75
 NUMBERS_SURE = {"joint": SURE, "published": DOUBTFUL}
 CLEARLY_BETTER = 1.2  # ratio of margins from which channels count as exchanged, or fringe numbers as others
-# Share of the lit pixels that must be returned for a shot to be compared with its other readings. Of objects with
-# photographs as albedo, sound ones have 0.5 to 0.98 and broken ones 0 to 0.9. A larger share refuses printed objects, a
-# smaller one takes time for shots that are refused anyway: `python evaluation/soundness.py --texture photographs`.
+# Share of the lit pixels that must be returned for a shot to be compared with its other readings. A larger one refuses
+# printed objects, a smaller one takes time for shots that are refused anyway: `python evaluation/soundness.py --texture
+# photographs`.
 STANDING_MIN = 0.5
 # Mean width in fringes of what is returned, at least. A larger width refuses printed objects. Across one fringe, other
 # numbers that are not among these readings are returned: `pytest tests/test_soundness.py -k broken`.

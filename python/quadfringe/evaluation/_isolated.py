@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from quadfringe import _core
 from quadfringe.evaluation._scenes import noisy_8bit
 from quadfringe.evaluation.scoring import Scene
+from quadfringe.evaluation.world.albedo import photographs
 
-__all__ = ["FRINGES", "isolated", "patches", "repeated", "tinted"]
+__all__ = ["FRINGES", "isolated", "patches", "printed", "repeated", "tinted"]
 
 # Fringe numbers that show the camera this many px a fringe, about.
 FRINGES = {
@@ -22,6 +23,7 @@ FRINGES = {
     74: (17.0, 16.0, 13.0),
     110: (12.0, 11.0, 9.0),
 }
+PATCH_PX, PRINTED_CONTRAST = 30, 0.8
 EDGE_PX = 2.0  # nearer pixels mix two sides of an edge
 
 
@@ -59,6 +61,13 @@ def isolated(
         phase_rad=2 * np.pi * numbers[0] * column_px / bench.visible.width,
         scored=inside & np.isfinite(column_px) & ~cast.shadow() & (cast.edge_distance_px() >= EDGE_PX),
     )
+
+
+def printed(period_px: int, fill: float, seed: int, *, surface: str = "face", texture: str = "photographs") -> Scene:
+    """Expose an object with strong colours, photographs or patches, which move the fringes of each channel."""
+    random = np.random.default_rng([seed, 3])
+    albedo = photographs((768, 1024), random) if texture == "photographs" else patches(PATCH_PX, seed)
+    return isolated(period_px, fill, seed, surface=surface, contrast=PRINTED_CONTRAST, albedo=albedo)
 
 
 def outline(shape: tuple[int, ...], fill: float, seed: int) -> NDArray[np.bool_]:
